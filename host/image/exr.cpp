@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// One-part OpenEXR files through the library's InputFile and OutputFile.
+#include "image/exr.hpp"
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+#include <half.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+namespace ols {
+
+namespace {
+
+// The channel names of an image as this reader understands it: RGBA, RGB, or one channel.
+std::vector<std::string> readable_channels(const Imf::ChannelList& channels) {
+    if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) {
+        if (channels.findChannel("A")) return {"R", "G", "B", "A"};
+        return {"R", "G", "B"};
+    }
+    if (channels.findChannel("Y")) return {"Y"};
+    std::vector<std::string> names;
+    for (auto it = channels.begin(); it != channels.end(); ++it) names.push_back(it.name());
+    if (names.size() == 1) return names;
+    return {};
+}
+
+Imf::Slice float_slice(Image& image, int channel, const Imath::Box2i& window) {
+    const size_t x_stride = sizeof(float) * image.channels, y_stride = x_stride * image.width;
+    char* base = reinterpret_cast<char*>(image.data.data() + channel) - std::ptrdiff_t(window.min.x) * x_stride -
+                 std::ptrdiff_t(window.min.y) * y_stride;
+    return Imf::Slice(Imf::FLOAT, base, x_stride, y_stride);
+}
+
+::half clamped_half(float v) {
+    return ::half(std::isfinite(v) ? std::clamp(v, -float(HALF_MAX), float(HALF_MAX)) : v);
+}
+
+}  // namespace
+
+Result<Image> read_exr(const std::string& path) {
+    try {
+        Imf::InputFile file(path.c_str());
+        const Imath::Box2i window = file.header().dataWindow();
+        const auto names = readable_channels(file.header().channels());
+        if (names.empty())
+            return fail("'" + path + "' has neither R G B nor a single channel: export it as an RGB OpenEXR file");
+        Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, int(names.size()));
+        Imf::FrameBuffer buffer;
+        for (size_t c = 0; c < names.size(); ++c) buffer.insert(names[c], float_slice(image, int(c), window));
+        file.setFrameBuffer(buffer);
+        file.readPixels(window.min.y, window.max.y);
+        return image;
+    } catch (const std::exception& e) {
+        return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
+    }
+}
+
+Status write_exr(const std::string& path, const Image& image, ExrType type,
+                 const std::map<std::string, std::string>& attributes) {
+    static const std::vector<std::vector<std::string>> names = {
+        {}, {"Y"}, {}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+    assert(image.channels == 1 || image.channels == 3 || image.channels == 4);
+    const auto& channels = names[image.channels];
+    const std::string temporary = path + ".part" + std::to_string(getpid());
+    try {
+        Imf::Header header(image.width, image.height);
+        for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
+        const bool half = type == ExrType::half_float;
+        for (const auto& name : channels) header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
+
+        // OutputFile converts nothing: half files need half samples (values beyond 65504 become the largest half, not Inf).
+        std::vector<::half> halves;
+        Imf::FrameBuffer buffer;
+        if (half) {
+            halves.reserve(image.data.size());
+            for (float v : image.data) halves.push_back(clamped_half(v));
+        }
+        for (int c = 0; c < image.channels; ++c) {
+            const size_t size = half ? sizeof(::half) : sizeof(float);
+            const char* base = half ? reinterpret_cast<const char*>(halves.data() + c)
+                                    : reinterpret_cast<const char*>(image.data.data() + c);
+            buffer.insert(channels[c], Imf::Slice(half ? Imf::HALF : Imf::FLOAT, const_cast<char*>(base),
+                                                  size * image.channels, size * image.channels * image.width));
+        }
+        Imf::OutputFile file(temporary.c_str(), header);
+        file.setFrameBuffer(buffer);
+        file.writePixels(image.height);
+    } catch (const std::exception& e) {
+        std::error_code ignored;
+        std::filesystem::remove(temporary, ignored);
+        return fail("cannot write '" + path + "': " + e.what());
+    }
+    std::error_code error;
+    std::filesystem::rename(temporary, path, error);
+    if (error) return fail("cannot write '" + path + "': " + error.message());
+    return Done{};
+}
+
+}  // namespace ols
