@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// Archives of reflectance functions (`take.rfa/`): what is in one, how it is written so that a crash loses nothing that
+// was finished, and how it is read.
+//
+//   take.rfa/manifest.json          what the take is; rewritten by rename
+//   take.rfa/journal.jsonl          one fsynced line an event: begin, target (file, bytes, checksum), missing target,
+//   end take.rfa/lights.lp              the lamps' names (lamp_000 ...) and directions take.rfa/cam0/target_000000.exr
+//   tiled, scene-linear: part "lamps" (layers lamp_000.Y ..., or lamp_000.R/G/B), part "mask", part
+//                                   "variance"
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "image/frame.hpp"
+#include "result.hpp"
+#include "stage/lamps.hpp"
+
+namespace ols {
+
+// The bits of a mask sample.
+enum MaskBit : uint32_t {
+    mask_saturated = 1,  // a sample that this lamp value rests on was at or above white
+    mask_missing = 2,    // a slot was missing
+    mask_outside = 4,    // outside the user's mask (ingest)
+};
+
+// One output frame of one camera: all OLAT values. Planes are row-major, top to bottom.
+struct Target {
+    uint32_t camera = 0, index = 0;
+    int width = 0, height = 0;
+    Cfa cfa = Cfa::none;  // a mosaic stays a mosaic; Cfa::rgb has three planes a lamp
+    std::vector<std::vector<float>>
+        lamps;                    // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
+    std::vector<uint32_t> mask;   // [y * width + x], MaskBit
+    std::vector<float> variance;  // [y * width + x] of one lamp value, mean over lamps; empty if not known
+    nlohmann::json provenance;    // cycle, tick, timecode, slots used: goes to the header and the journal
+
+    int planes() const { return cfa == Cfa::rgb ? 3 : 1; }
+};
+
+enum class SampleType { half_float, single_float };
+
+// What a manifest begins with; `extra` holds what only some takes have (identification, calibration, program).
+struct TakeInfo {
+    std::string production, scene, take, notes;  // slate
+    std::string timecode_start;                  // SMPTE "HH:MM:SS:FF", of target 0
+    double frame_rate_hz = 24;                   // of targets
+    std::string basis;                           // "" for ingested photographs
+    std::string value_unit;                      // "reflectance" (white = 1) or "pixel" (full scale = 1)
+    std::vector<LightPosition> lights;
+    SampleType sample_type = SampleType::half_float;
+    nlohmann::json extra;
+};
+
+class ArchiveWriter {
+  public:
+    // Makes the directory and its journal. Refuses one that exists, naming it, unless `overwrite` (which removes only
+    // something that is an archive).
+    static Result<ArchiveWriter> create(const std::string& path, const TakeInfo& info, bool overwrite = false);
+
+    // Writes a target to a temporary name, fsyncs, renames, then journals it; safe to call from one thread at a time.
+    Status write_target(const Target& target);
+
+    // Journals a target that could not be made, and why.
+    Status note_missing_target(uint32_t camera, uint32_t index, const std::string& why,
+                               const nlohmann::json& detail = {});
+
+    // Adds to the manifest's `extra` (merged by key).
+    void add_to_manifest(const nlohmann::json& extra);
+
+    // Completes the manifest and journals the end; an archive without it reads as unfinished.
+    Status finish();
+
+    ArchiveWriter(ArchiveWriter&&) noexcept;
+    ~ArchiveWriter();
+
+  private:
+    struct State;
+    explicit ArchiveWriter(std::unique_ptr<State>);
+    std::unique_ptr<State> state_;
+};
+
+struct TargetEntry {
+    uint32_t camera = 0, index = 0;
+    std::string file;  // relative to the archive; empty for a missing target
+    std::string why_missing;
+};
+
+class ArchiveReader {
+  public:
+    static Result<ArchiveReader> open(const std::string& path);
+
+    const TakeInfo& info() const;
+    const nlohmann::json& manifest() const;
+    const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
+    bool finished() const;                            // the journal has its end
+
+    // Reads one finished target with all its lamps.
+    Result<Target> read_target(uint32_t camera, uint32_t index) const;
+
+    // Checks every file against the journal's size and checksum and opens it; problems are one line each and name the
+    // file.
+    std::vector<std::string> verify() const;
+
+    ArchiveReader(ArchiveReader&&) noexcept;
+    ~ArchiveReader();
+
+  private:
+    struct State;
+    explicit ArchiveReader(std::unique_ptr<State>);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace ols
