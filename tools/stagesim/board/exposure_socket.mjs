@@ -64,16 +64,12 @@ export class ExposureSocket {
     this.#full = !this.#socket.write(`${JSON.stringify(message)}\n`);
   }
 
-  /** Says the end, whatever is full, and resolves once all is written. */
+  /** Says the end, whatever is full, and resolves once all is written or the reader has gone. */
   end() {
     return new Promise((resolve) => {
-      if (this.#closed) {
-        resolve();
-        return;
-      }
       this.#socket.once('close', resolve);
-      this.#socket.end(`${JSON.stringify({ type: 'end' })}\n`);
-      this.#socket.resume();
+      if (this.#closed) resolve();
+      else this.#socket.end(`${JSON.stringify({ type: 'end' })}\n`, () => this.#socket.destroy());
     });
   }
 }

@@ -15,29 +15,29 @@ const NOP = 0xa042; // mov y, y: how assemblers write `nop`
  * @property {number} xPerPass
  * @property {number} yPerPass
  * @property {boolean} watchesPin
+ * @property {number} side      bits 12:8 that side-set takes, the same in every instruction
  */
 
 /**
  * Follows the program from `pc` while every decrement jumps (its register is not zero yet) and the pin stays as it
- * is. Returns the loop if that leads back to `pc` through jumps and nops alone, and null otherwise. Side-set is
- * refused: it may change pins on the way.
+ * is. Returns the loop if that leads back to `pc` through jumps and nops alone, and null otherwise. All of it must
+ * side-set the same: then no pin changes from the second pass on.
  * @param {{memory: Uint16Array, wrapTop: number, wrapBottom: number, sideBits: number, sideOptional: boolean,
  *          pinHigh: boolean}} program
  * @returns {PioLoop | null}
  */
 export function findLoop(program, pc) {
   const loop = { pcs: [], starts: [], xSteps: [], ySteps: [], passTicks: 0, xPerPass: 0, yPerPass: 0,
-                 watchesPin: false };
+                 watchesPin: false, side: sideOf(program, program.memory[pc]) };
   let at = pc;
   do {
     const opcode = program.memory[at];
-    if (loop.pcs.length === LONGEST_LOOP || setsSide(program, opcode)) return null;
+    if (loop.pcs.length === LONGEST_LOOP || sideOf(program, opcode) !== loop.side) return null;
     loop.pcs.push(at);
     loop.starts.push(loop.passTicks);
     loop.xSteps.push(loop.xPerPass);
     loop.ySteps.push(loop.yPerPass);
-    const delayBits = 5 - program.sideBits;
-    loop.passTicks += 1 + ((opcode >> 8) & ((1 << delayBits) - 1));
+    loop.passTicks += 1 + ((opcode >> 8) & ((1 << (5 - program.sideBits)) - 1));
     const taken = jumps(program, opcode, loop);
     if (taken === null) return null;
     at = taken ? opcode & 0x1f : at === program.wrapTop ? program.wrapBottom : (at + 1) & 0x1f;
@@ -45,9 +45,10 @@ export function findLoop(program, pc) {
   return loop;
 }
 
-function setsSide(program, opcode) {
-  if (program.sideBits === 0) return false;
-  return !program.sideOptional || (opcode & 0x1000) !== 0;
+function sideOf(program, opcode) {
+  const delayBits = 5 - program.sideBits;
+  const optedOut = program.sideOptional && (opcode & 0x1000) === 0;
+  return optedOut ? 0 : ((opcode >> 8) & 0x1f) >> delayBits;
 }
 
 /** Whether `opcode` jumps; null if it is neither a jump with a known outcome nor a nop. */

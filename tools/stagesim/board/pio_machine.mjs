@@ -9,6 +9,7 @@ import { Stall } from './pio_stall.mjs';
 
 const NEVER = Infinity;
 const NO_LATCH = -1;
+const NO_ADDRESS = -1;
 
 const EXEC_SIDE_EN = 1 << 30;
 const EXEC_SIDE_PINDIR = 1 << 29;
@@ -177,7 +178,8 @@ export class PioMachine {
 
   // Skipping
 
-  #enterLoop() {
+  /** Starts to skip a loop if the jump from address `from` was its last instruction: one pass has been stepped. */
+  #enterLoop(from) {
     const pinHigh = this.block.pads.seen(this.jmpPin, this.due, this.block.syncBypass);
     const key = this.pc * 2 + (pinHigh ? 1 : 0);
     let loop = this.loopCache.get(key);
@@ -186,7 +188,8 @@ export class PioMachine {
                         sideBits: this.sideBits, sideOptional: this.sideOptional, pinHigh }, this.pc);
       this.loopCache.set(key, loop);
     }
-    if (loop === null || (loop.watchesPin && !this.block.pads.settled(this.jmpPin, this.due))) return;
+    if (loop === null || loop.pcs.at(-1) !== from) return;
+    if (loop.watchesPin && !this.block.pads.settled(this.jmpPin, this.due)) return;
     // Whole passes in which every decrement finds its register not zero.
     const xPasses = loop.xPerPass ? Math.floor(this.x / loop.xPerPass) : NEVER;
     const yPasses = loop.yPerPass ? Math.floor(this.y / loop.yPerPass) : NEVER;
@@ -250,6 +253,7 @@ export class PioMachine {
     const opcode = latched ? this.latch : this.block.memory[this.pc];
     this.latch = NO_LATCH;
     this.jumped = false;
+    const from = this.pc;
     this.stall = execute(this, opcode, cycle);
     this.#side(opcode);
     if (this.stall !== Stall.NONE) {
@@ -265,14 +269,14 @@ export class PioMachine {
     if (!latched && !this.jumped) this.pc = this.pc === this.wrapTop ? this.wrapBottom : (this.pc + 1) & 0x1f;
     // The delay of an instruction that fills the latch is ignored (datasheet 3.4.5.2).
     const delay = this.latch !== NO_LATCH ? 0 : (opcode >> 8) & ((1 << (5 - this.sideBits)) - 1);
-    this.#scheduleAfter(cycle, delay);
+    this.#scheduleAfter(cycle, delay, latched ? NO_ADDRESS : from);
   }
 
-  #scheduleAfter(cycle, delay) {
+  #scheduleAfter(cycle, delay, from) {
     this.due = NEVER;
     if (this.naive || !this.enabled) this.delayLeft = delay;
     this.#actAt(this.clock.tickFrom(cycle + 1) + (this.naive || !this.enabled ? 0 : delay));
-    if (this.jumped && !this.naive && this.enabled && this.latch === NO_LATCH) this.#enterLoop();
+    if (this.jumped && !this.naive && this.enabled && this.latch === NO_LATCH) this.#enterLoop(from);
   }
 
   /** Side-set happens in the first cycle, stalled or not, and wins over OUT and SET (datasheet 3.5.6). */

@@ -52,7 +52,7 @@ export class UsbSocket {
 
   /** The device has gone: pending transfers have been answered, the client must connect anew. */
   drop() {
-    this.#client?.end();
+    this.#client?.destroySoon(); // once what was written has gone out
     this.#forget();
   }
 
