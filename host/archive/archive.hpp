@@ -2,11 +2,14 @@
 // Archives of reflectance functions (`take.rfa/`): what is in one, how it is written so that a crash loses nothing that
 // was finished, and how it is read.
 //
-//   take.rfa/manifest.json          what the take is; rewritten by rename
-//   take.rfa/journal.jsonl          one fsynced line an event: begin, target (file, bytes, checksum), missing target,
-//   end take.rfa/lights.lp              the lamps' names (lamp_000 ...) and directions take.rfa/cam0/target_000000.exr
-//   tiled, scene-linear: part "lamps" (layers lamp_000.Y ..., or lamp_000.R/G/B), part "mask", part
-//                                   "variance"
+//   take.rfa/manifest.json             what the take is, its lamps, and what else is known; rewritten by rename
+//   take.rfa/journal.jsonl             one fsynced line an event: begin, target (file, bytes, CRC-32), missing, end
+//   take.rfa/lights.lp                 the lamps as lamp_000 ... and their directions, for other programs
+//   take.rfa/cam0/target_000000.exr    tiled, scene-linear, three parts: "lamps" (layers lamp_000.Y, or .R .G .B),
+//                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known)
+//
+// A target counts only when its journal line is complete and its file agrees with it. A target's file gets its name
+// after its bytes are on the disk, and its journal line after that.
 #pragma once
 
 #include <cstdint>
@@ -26,6 +29,7 @@ enum MaskBit : uint32_t {
     mask_saturated = 1,  // a sample that this lamp value rests on was at or above white
     mask_missing = 2,    // a slot was missing
     mask_outside = 4,    // outside the user's mask (ingest)
+    mask_clamped = 8,    // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
 };
 
 // One output frame of one camera: all OLAT values. Planes are row-major, top to bottom.
@@ -33,27 +37,31 @@ struct Target {
     uint32_t camera = 0, index = 0;
     int width = 0, height = 0;
     Cfa cfa = Cfa::none;  // a mosaic stays a mosaic; Cfa::rgb has three planes a lamp
-    std::vector<std::vector<float>>
-        lamps;                    // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
-    std::vector<uint32_t> mask;   // [y * width + x], MaskBit
-    std::vector<float> variance;  // [y * width + x] of one lamp value, mean over lamps; empty if not known
-    nlohmann::json provenance;    // cycle, tick, timecode, slots used: goes to the header and the journal
+    // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
+    std::vector<std::vector<float>> lamps;
+    std::vector<uint32_t> mask;      // [y * width + x], MaskBit
+    std::vector<float> variance;     // [y * width + x] of one lamp value, mean over lamps; empty if not known
+    std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
+    nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
 
     int planes() const { return cfa == Cfa::rgb ? 3 : 1; }
 };
 
 enum class SampleType { half_float, single_float };
+enum class Compression { none, zips };  // of the lamps part; zips is lossless, smaller and slower to read
 
 // What a manifest begins with; `extra` holds what only some takes have (identification, calibration, program).
 struct TakeInfo {
     std::string production, scene, take, notes;  // slate
-    std::string timecode_start;                  // SMPTE "HH:MM:SS:FF", of target 0
+    std::string timecode_start;                  // SMPTE "HH:MM:SS:FF" of target 0, non-drop; "" if not known
     double frame_rate_hz = 24;                   // of targets
     std::string basis;                           // "" for ingested photographs
     std::string value_unit;                      // "reflectance" (white = 1) or "pixel" (full scale = 1)
     std::vector<LightPosition> lights;
     SampleType sample_type = SampleType::half_float;
-    nlohmann::json extra;
+    Compression compression = Compression::none;
+    std::string color_interop_id = "unknown";  // of lamp values; camera mosaics have no standard name
+    nlohmann::json extra = nlohmann::json::object();
 };
 
 class ArchiveWriter {
