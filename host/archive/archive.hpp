@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -64,20 +65,37 @@ struct TakeInfo {
     nlohmann::json extra = nlohmann::json::object();
 };
 
+// A rectangle of pixels.
+struct Box {
+    int x = 0, y = 0, width = 0, height = 0;
+};
+
+// Fills out[(y - box.y) * box.width + x - box.x] with samples of a plane (lamp * planes + colour).
+using PlaneSource = std::function<Status(int plane, const Box& box, float* out)>;
+
+// "lamp_000": the layer of a lamp in an archive of `count` lamps; more digits beyond a thousand, so that names sort.
+std::string lamp_layer(int lamp, int count);
+
 class ArchiveWriter {
   public:
-    // Makes the directory and its journal. Refuses one that exists, naming it, unless `overwrite` (which removes only
-    // something that is an archive).
+    // Makes the directory with its manifest, lights and journal, or leaves nothing. A path that exists is refused by
+    // name; `overwrite` removes it first, but only files that an archive consists of: a stranger among them is an
+    // error.
     static Result<ArchiveWriter> create(const std::string& path, const TakeInfo& info, bool overwrite = false);
 
-    // Writes a target to a temporary name, fsyncs, renames, then journals it; safe to call from one thread at a time.
+    // Writes a target to a temporary name, fsyncs, renames, then journals it; for one thread at a time. After an error
+    // (a full disk, say) neither file nor journal line stays, what was written before is untouched, and the writer may
+    // be used on. Values that the sample type cannot hold are clamped and masked (mask_clamped), never Inf or NaN.
     Status write_target(const Target& target);
+
+    // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.
+    Status write_target(const Target& head, const PlaneSource& source);
 
     // Journals a target that could not be made, and why.
     Status note_missing_target(uint32_t camera, uint32_t index, const std::string& why,
                                const nlohmann::json& detail = {});
 
-    // Adds to the manifest's `extra` (merged by key).
+    // Adds to the manifest's `extra` (merged by key, RFC 7396); on the disk after finish().
     void add_to_manifest(const nlohmann::json& extra);
 
     // Completes the manifest and journals the end; an archive without it reads as unfinished.
@@ -94,12 +112,22 @@ class ArchiveWriter {
 
 struct TargetEntry {
     uint32_t camera = 0, index = 0;
-    std::string file;  // relative to the archive; empty for a missing target
-    std::string why_missing;
+    std::string file;         // relative to the archive; empty for a missing target
+    std::string why_missing;  // empty for a finished one
+    nlohmann::json detail;    // provenance of a finished target, detail of a missing one
+    uint64_t bytes = 0;
+    uint32_t crc32 = 0;
+};
+
+// What verify found: finished targets whose files are as the journal says, and one line for everything else.
+struct Verification {
+    std::vector<std::string> intact;    // files, relative to the archive
+    std::vector<std::string> problems;  // each names its file: damaged, never finished, left over
 };
 
 class ArchiveReader {
   public:
+    // Opens finished and unfinished archives alike: a torn last journal line and leftovers are verify's to tell.
     static Result<ArchiveReader> open(const std::string& path);
 
     const TakeInfo& info() const;
@@ -107,12 +135,17 @@ class ArchiveReader {
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
     bool finished() const;                            // the journal has its end
 
-    // Reads one finished target with all its lamps.
+    // Everything of a target but its samples: size, colour filter, missing lamps, provenance.
+    Result<Target> read_head(uint32_t camera, uint32_t index) const;
+
+    // Reads one finished target with all its lamps: width * height * lamps * planes * 4 bytes.
     Result<Target> read_target(uint32_t camera, uint32_t index) const;
 
-    // Checks every file against the journal's size and checksum and opens it; problems are one line each and name the
-    // file.
-    std::vector<std::string> verify() const;
+    // A part of a target, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels.
+    Result<Target> read_box(uint32_t camera, uint32_t index, const Box& box) const;
+
+    // Compares every file with the journal's size and checksum and opens it.
+    Verification verify() const;
 
     ArchiveReader(ArchiveReader&&) noexcept;
     ~ArchiveReader();
