@@ -4,8 +4,10 @@
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <half.h>
 #include <unistd.h>
@@ -62,10 +64,18 @@ Result<Image> read_exr(const std::string& path) {
     }
 }
 
+Result<bool> is_exr_cube_map(const std::string& path) {
+    try {
+        const Imf::InputFile file(path.c_str());
+        return Imf::hasEnvmap(file.header()) && Imf::envmap(file.header()) == Imf::ENVMAP_CUBE;
+    } catch (const std::exception& e) {
+        return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
+    }
+}
+
 Status write_exr(const std::string& path, const Image& image, ExrType type,
                  const std::map<std::string, std::string>& attributes) {
-    static const std::vector<std::vector<std::string>> names = {
-        {}, {"Y"}, {}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+    static const std::vector<std::vector<std::string>> names = {{}, {"Y"}, {}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
     assert(image.channels == 1 || image.channels == 3 || image.channels == 4);
     const auto& channels = names[image.channels];
     const std::string temporary = path + ".part" + std::to_string(getpid());
@@ -75,7 +85,8 @@ Status write_exr(const std::string& path, const Image& image, ExrType type,
         const bool half = type == ExrType::half_float;
         for (const auto& name : channels) header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
 
-        // OutputFile converts nothing: half files need half samples (values beyond 65504 become the largest half, not Inf).
+        // OutputFile converts nothing: half files need half samples (values beyond 65504 become the largest half, not
+        // Inf).
         std::vector<::half> halves;
         Imf::FrameBuffer buffer;
         if (half) {

@@ -13,9 +13,13 @@ namespace ols {
 
 enum class ExrType { half_float, single_float };
 
-// Reads R G B [A] or Y (or any single channel) of a one-part scanline or tiled file into 3, 4 or 1 channels, rows top to bottom, the
-// data window's size. Errors name the file and what is wrong with it. Values are as stored: NaN and Inf are the caller's to judge.
+// Reads R G B [A] or Y (or any single channel) of a one-part scanline or tiled file into 3, 4 or 1 channels, rows top
+// to bottom, the data window's size. Errors name the file and what is wrong with it. Values are as stored: NaN and Inf
+// are the caller's to judge.
 Result<Image> read_exr(const std::string& path);
+
+// Whether a file's `envmap` attribute says that it is a cube map. False without the attribute.
+Result<bool> is_exr_cube_map(const std::string& path);
 
 // Writes 1 (Y), 3 (R G B) or 4 (R G B A, premultiplied) channels, ZIP compressed, scene-linear, to a temporary
 // name and renames it, so that no half-written file stays. `attributes` are string attributes of the header.

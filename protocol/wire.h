@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: MIT
+// Every message between a host and the board, byte for byte: packed little-endian C structs for both sides.
+// PROTOCOL.md draws them; layout_hash.py hashes their layout, so a change here makes old and new refuse each other.
+#ifndef OLS_WIRE_H
+#define OLS_WIRE_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+#define OLS_WIRE_ASSERT static_assert
+#else
+#define OLS_WIRE_ASSERT _Static_assert
+#endif
+
+OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-endian, and so must be its users");
+
+#define OLS_FRAME_SYNC 0x534c       // bytes 4c 53, "LS"
+#define OLS_PAYLOAD_BYTES_MAX 1024  // of one frame
+#define OLS_SLOTS_MAX 1024          // of one program
+#define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
+#define OLS_LOG_ENTRIES_MAX 48      // of one reply
+#define OLS_NO_SLOT 0xffff          // where no slot is to blame
+#define OLS_REPLY 0x80              // a reply's type is its request's with this bit
+
+#pragma pack(push, 1)
+
+// A frame is this header, `payload_bytes` of payload and the CRC-32 (u32) of both. `header_check` is the low half of
+// the CRC-32 of the eight bytes before it: a corrupt length is noticed at once, not after waiting for bytes that never
+// come.
+struct ols_frame_header {
+    uint16_t sync;
+    uint16_t payload_bytes;
+    uint16_t type;        // enum ols_message
+    uint16_t request_id;  // chosen by the host, returned in the reply
+    uint16_t header_check;
+};
+
+// Requests. Without a struct below, a request or reply has no payload.
+enum ols_message {
+    OLS_HELLO = 0x01,             // -> ols_hello_reply, in any state
+    OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed or playing
+    OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
+    OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded
+    OLS_ARM = 0x05,               // loaded or done -> armed: first pattern shifted, everything ready
+    OLS_START = 0x06,             // armed -> playing
+    OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
+    OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
+    OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
+    OLS_CLEAR_FAULT = 0x0a,       // fault -> idle; the program must be loaded again
+    OLS_ERROR = 0x7f              // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
+};
+
+// The first eight bytes of both structs never change, whatever else does, so that any two versions can compare hashes.
+struct ols_hello {
+    uint64_t layout_hash;
+};
+
+enum ols_capability {
+    OLS_CAN_OFFSET_TRIGGERS = 1  // trigger_offset_ticks may differ from 0
+};
+
+struct ols_hello_reply {
+    uint64_t layout_hash;
+    char firmware_version[24];  // zero-terminated
+    uint8_t board_id[8];        // the flash chip's unique number
+    uint32_t boot_nonce;        // differs after each reset
+    uint32_t tick_hz;
+    uint32_t capabilities;  // enum ols_capability bits
+    uint16_t chain_bits;    // of this board's shift chain
+    uint16_t slots_max;
+    uint32_t shift_ticks;     // to send one pattern
+    uint32_t slot_gap_ticks;  // period_ticks - exposure_ticks must be at least this
+};
+
+// The program follows in chunks: slot_count times an ols_slot and its ceil(chain_bits / 32) pattern words.
+struct ols_load_begin {
+    uint16_t slot_count;  // 1..OLS_SLOTS_MAX
+    uint16_t chain_bits;  // must be the board's
+    uint32_t cycles;      // 0: until stopped
+    uint32_t program_bytes;
+    uint32_t program_crc32;
+};
+
+struct ols_load_chunk {
+    uint32_t offset_bytes;  // of the data that follow, in the program
+};
+
+enum ols_slot_kind {
+    OLS_BASIS = 0,
+    OLS_TRACKING = 1,
+    OLS_MATTE = 2,
+    OLS_DARK = 3  // triggers the cameras, lights nothing; its pattern is all zero
+};
+
+// Chain bit b is words[b / 32] >> (31 - b % 32) & 1; bits past the chain's end are zero.
+struct ols_slot {
+    uint8_t kind;                  // enum ols_slot_kind
+    uint8_t trigger_mask;          // bit n: TRIGn
+    uint16_t reserved;             // 0
+    uint32_t exposure_ticks;       // of trigger and light
+    uint32_t period_ticks;         // trigger rise to the next slot's trigger rise
+    int32_t trigger_offset_ticks;  // 0 without OLS_CAN_OFFSET_TRIGGERS
+};
+
+enum ols_state {
+    OLS_STATE_IDLE = 0,  // no program
+    OLS_STATE_LOADED = 1,
+    OLS_STATE_ARMED = 2,
+    OLS_STATE_PLAYING = 3,
+    OLS_STATE_DONE = 4,  // all cycles played; the program is still there
+    OLS_STATE_FAULT = 5  // dark until OLS_CLEAR_FAULT
+};
+
+enum ols_fault {
+    OLS_FAULT_NONE = 0,
+    OLS_FAULT_TIMELINE_STARVED = 1,  // the next event was not there in time
+    OLS_FAULT_SHIFTER_STARVED = 2,   // the next pattern was not there in time
+    OLS_FAULT_SLIPPED = 3,           // a measured trigger was not at its scheduled tick
+    OLS_FAULT_HOST_LOST = 4,         // the bus was reset, suspended or unplugged while armed or playing
+    OLS_FAULT_WATCHDOG = 5,          // the processor hung and was reset
+    OLS_FAULT_PROCESSOR = 6,         // hard fault or unexpected interrupt
+    OLS_FAULT_BAD_MEMORY = 7         // the program in memory no longer has its CRC
+};
+
+struct ols_status_reply {
+    uint8_t state;        // enum ols_state
+    uint8_t fault;        // enum ols_fault
+    uint16_t fault_slot;  // or OLS_NO_SLOT
+    uint32_t boot_nonce;
+    uint64_t fault_ticks;  // since start, to a microsecond
+    uint64_t now_ticks;    // since start, to a microsecond; 0 before
+    uint32_t triggers_fired;
+    uint32_t cycles_played;
+    uint32_t log_entries_lost;
+    uint32_t program_crc32;  // of the loaded program, 0 without
+};
+
+struct ols_read_trigger_log {
+    uint32_t first_counter;
+    uint16_t entries_max;
+    uint16_t reserved;  // 0
+};
+
+struct ols_trigger_log_reply {
+    uint32_t first_counter;  // of the first entry that follows
+    uint32_t next_counter;   // that the next trigger will have
+    uint32_t entries_lost;   // since start
+    uint16_t entry_count;
+    uint16_t reserved;  // 0
+};
+
+// A trigger as measured at the pin. Only TRIG0 is watched: slots without it in their mask have no entry.
+struct ols_trigger_log_entry {
+    uint64_t rise_ticks;  // since start, even: measured every second tick
+    uint32_t counter;     // 0 for the first trigger after start
+    uint32_t cycle;
+    uint16_t slot;
+    uint16_t trigger_mask;
+};
+
+enum ols_error_code {
+    OLS_ERROR_UNKNOWN_MESSAGE = 1,
+    OLS_ERROR_BAD_LENGTH = 2,
+    OLS_ERROR_BAD_STATE = 3,
+    OLS_ERROR_BAD_OFFSET = 4,
+    OLS_ERROR_BAD_CRC = 5,
+    OLS_ERROR_BAD_PROGRAM = 6,
+    OLS_ERROR_FAULT_LATCHED = 7
+};
+
+struct ols_error_reply {
+    uint16_t code;   // enum ols_error_code
+    uint16_t slot;   // or OLS_NO_SLOT
+    char text[116];  // what is wrong and what to do, zero-terminated
+};
+
+#pragma pack(pop)
+
+OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 64, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 16, "load begin");
+OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
+OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
+OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 40, "status reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");
+OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) == 16, "trigger log reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_entry) == 20, "trigger log entry");
+OLS_WIRE_ASSERT(sizeof(struct ols_error_reply) == 120, "error reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) + OLS_LOG_ENTRIES_MAX * sizeof(struct ols_trigger_log_entry) <=
+                    OLS_PAYLOAD_BYTES_MAX,
+                "a full trigger log reply fits a frame");
+
+#endif
