@@ -73,8 +73,9 @@ export class Pio extends BasePeripheral {
   }
 
   inputsChanged(changed, cycle) {
-    for (const machine of this.machines) machine.inputsChanged(changed, cycle);
-    this.#reschedule();
+    for (const machine of this.machines) {
+      if (machine.inputsChanged(changed, cycle)) this.due = Math.min(this.due, machine.due);
+    }
   }
 
   get quiet() {

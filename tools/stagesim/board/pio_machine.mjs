@@ -42,6 +42,7 @@ export class PioMachine {
     this.tick = 0; // of the machine's clock, in which it acts next
     this.delayLeft = 0; // ticks; naive stepping counts delays down, otherwise `tick` already lies behind them
     this.stall = Stall.NONE;
+    this.waitPin = 0; // while stalled on a pin
     this.latch = NO_LATCH; // instruction from OUT EXEC, MOV EXEC or a stalled SMx_INSTR write
     this.jumped = false;
     this.irqRaised = false; // a stalled `irq wait` has set its flag
@@ -156,12 +157,17 @@ export class PioMachine {
     }
   }
 
-  /** Input pins in `changed` look different from `cycle` on. */
+  /** Input pins in `changed` look different from `cycle` on. Returns whether this machine is watching one of them. */
   inputsChanged(changed, cycle) {
-    this.wake(Stall.PIN, cycle);
+    if (this.stall === Stall.PIN && (changed >>> this.waitPin) & 1) {
+      this.wake(Stall.PIN, cycle);
+      return true;
+    }
     if (this.loop !== null && this.loop.watchesPin && (changed >>> this.jmpPin) & 1) {
       this.due = Math.min(this.due, this.clock.cycleOf(this.clock.tickFrom(cycle)));
+      return true;
     }
+    return false;
   }
 
   /** True if nothing but an event from outside, or the end of a wait for a pin, can make this machine act. */
