@@ -11,9 +11,9 @@ namespace ols {
 
 ImageDifference image_difference(const Image& image, const Image& reference, double peak) {
     const int channels = std::min(image.channels, 3);
-    assert(image.width == reference.width && image.height == reference.height && channels == std::min(reference.channels, 3));
+    assert(image.width == reference.width && image.height == reference.height &&
+           channels == std::min(reference.channels, 3));
     double squares = 0, absolute = 0, signed_sum = 0, reference_sum = 0, largest = 0, maximum = 0;
-    const int channels = std::min(image.channels, 3);
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
             for (int c = 0; c < channels; ++c) {

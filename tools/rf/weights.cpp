@@ -27,7 +27,8 @@ Result<std::vector<LightPosition>> lights_of(const Options& options) {
     }
     if (!options.lights_file.empty()) return read_lp(options.lights_file);
     std::vector<LightPosition> lights;
-    for (Vec3 direction : stage_lamp_directions()) lights.push_back({fmt::format("lamp_{:03}", lights.size()), direction});
+    for (Vec3 direction : stage_lamp_directions())
+        lights.push_back({fmt::format("lamp_{:03}", lights.size()), direction});
     return lights;
 }
 
@@ -37,8 +38,9 @@ void print_table(const std::vector<LightPosition>& lights, const SphereCells& ce
     for (int i = 0; i < cells.size(); ++i) {
         const Vec3 d = cells.directions()[i];
         const Rgb& w = lighting.weights.irradiance[i];
-        fmt::print("{:<16} {:>9.6f} {:>9.6f} {:>9.6f} {:>11.6f} {:>9.2f}  {:>11.6g} {:>11.6g} {:>11.6g}\n", lights[i].name,
-                   d.x, d.y, d.z, cells.solid_angle(i), cells.reach(i) * 180 / std::numbers::pi, w[0], w[1], w[2]);
+        fmt::print("{:<16} {:>9.6f} {:>9.6f} {:>9.6f} {:>11.6f} {:>9.2f}  {:>11.6g} {:>11.6g} {:>11.6g}\n",
+                   lights[i].name, d.x, d.y, d.z, cells.solid_angle(i), cells.reach(i) * 180 / std::numbers::pi, w[0],
+                   w[1], w[2]);
     }
 }
 
@@ -78,8 +80,9 @@ Status run(const Options& options) {
 void add_weights_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<Options>();
     CLI::App* verb = app.add_subcommand("weights", "print the irradiance each lamp gives for an environment");
-    verb->footer("Example: rf weights --env sunset.exr --rotate 90 --json\n"
-                 "Without --lights or an archive, the 156 lamps of the stage are used.");
+    verb->footer(
+        "Example: rf weights --env sunset.exr --rotate 90 --json\n"
+        "Without --lights or an archive, the 156 lamps of the stage are used.");
     auto* archive = verb->add_option("archive", options->archive, "take.rfa, for its lights");
     verb->add_option("--lights", options->lights_file, "light positions (.lp)")->excludes(archive);
     options->lighting.add_to(*verb);
