@@ -68,7 +68,7 @@ void LightingOptions::add_to(CLI::App& verb) {
                     "a point light from direction x y z, given to the lamp nearest to it; r g b is its irradiance over "
                     "pi: colour 1 1 1 shows that lamp's image as it is; repeatable")
         ->type_name("\"x y z r g b\"")
-        ->take_all();
+        ->allow_extra_args(false);
 }
 
 Result<Lighting> make_lighting(const LightingOptions& options, const SphereCells& cells) {
