@@ -238,6 +238,7 @@ uint32_t transport_session(void) {
 size_t transport_receive(uint8_t* bytes) {
     const size_t byte_count =
         board.incoming_bytes < TRANSPORT_PACKET_BYTES ? board.incoming_bytes : TRANSPORT_PACKET_BYTES;
+    if (byte_count == 0) return 0;
     memcpy(bytes, board.incoming, byte_count);
     board.incoming += byte_count;
     board.incoming_bytes -= byte_count;
