@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+# The verbs of the project. `make help` lists them.
+
+PYTHON := .venv/bin/python
+HOST := build/host
+CHECKED := build/checked
+
+.PHONY: all help setup firmware host checked assets demo test unit hil stability fuzz-smoke fuzz lint lint-fast \
+        format flash install clean
+
+all: firmware host ## build the firmware image and the host programs
+
+help: ## list the verbs
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: ## install what is needed (apt, npm, pip); does nothing the second time
+	@tools/setup/install.sh
+
+firmware: setup ## build/firmware/stage.elf and stage.uf2
+	@$(MAKE) --no-print-directory -C firmware
+
+host: setup ## build/host/bin/{stagectl,rf,stagesim}
+	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
+	@ninja -C $(HOST) --quiet
+
+checked: setup ## the same code and its unit tests with ASan and UBSan, in build/checked
+	@test -e $(CHECKED)/build.ninja || cmake -S . -B $(CHECKED) -G Ninja -DOLS_SANITIZE=ON >/dev/null
+	@ninja -C $(CHECKED) --quiet
+
+assets: setup ## fetch the CC0 head and environment maps into .cache/assets
+	@python3 tools/stagesim/assets/fetch.py
+
+demo: all assets ## the whole system once, end to end; results in out/demo
+	@python3 tools/demo/demo.py --out out/demo
+
+test: all checked assets lint-fast unit stability fuzz-smoke hil ## everything that needs no hardware
+	@echo "make test: all passed"
+
+unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
+	@ctest --test-dir $(CHECKED) --output-on-failure -j2 --no-tests=error
+	@$(PYTHON) -m pytest -q tests/unit tests/oracle
+	@cd tools/stagesim/board && npm test --silent
+
+stability: all ## hard cases (docs/stability.md)
+	@$(PYTHON) -m pytest -q tests/stability
+
+hil: all ## the numbered board tests and the capture tests, on the emulated board (BOARD=emulated)
+	@$(PYTHON) -m pytest -q tests/hil tests/capture
+
+fuzz-smoke: setup ## a few seconds of every fuzzer
+	@tests/fuzz/run.sh 5
+
+fuzz: setup ## ten minutes of every fuzzer; SECONDS_EACH=n for another budget
+	@tests/fuzz/run.sh $(or $(SECONDS_EACH),600)
+
+lint: host ## formatting, licence tags, file lengths, include directions, clang-tidy
+	@python3 tools/lint/lint.py --tidy
+
+lint-fast: setup
+	@python3 tools/lint/lint.py
+
+format: setup ## clang-format in place
+	@git ls-files '*.cpp' '*.hpp' '*.c' '*.h' | xargs clang-format -i
+
+flash: firmware ## copy stage.uf2 to a board in BOOTSEL mode
+	@tools/setup/flash.sh build/firmware/stage.uf2
+
+install: host ## install the programs (DESTDIR, PREFIX)
+	@cmake --install $(HOST) --prefix $(or $(PREFIX),/usr/local)
+
+clean: ## remove what was built (not the caches)
+	rm -rf $(HOST) $(CHECKED) build/firmware out

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// The default stage, and stage.toml.
+#include "stage/stage.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "stage/toml_section.hpp"
+#include "wire.h"
+
+namespace ols {
+
+namespace {
+
+std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions) {
+    std::vector<LightPosition> lamps;
+    for (size_t i = 0; i < directions.size(); ++i) lamps.push_back({fmt::format("lamp_{:03}", i), directions[i]});
+    return lamps;
+}
+
+// Six lamps on arms in front of the 60 x 40 cm matte board, which hangs half a metre behind the subject (Wenger 3.2):
+// three above and three below the camera's view, turned towards the board.
+std::vector<Vec3> default_matte_lamps() {
+    std::vector<Vec3> places;
+    for (const double y : {0.32, -0.32})
+        for (const double x : {-0.25, 0.0, 0.25}) places.push_back({x, y, -0.35});
+    return places;
+}
+
+std::vector<int> identity_chain(int lamps) {
+    std::vector<int> bits(lamps);
+    for (int i = 0; i < lamps; ++i) bits[i] = i;
+    return bits;
+}
+
+void read_lamps(TomlSection lamps, StageConfig& stage) {
+    std::string lp;
+    lamps.read("lp", lp);
+    if (!lp.empty()) {
+        const auto lights = read_lp(lamps.resolve_path(lp));
+        if (lights.ok()) {
+            std::vector<Vec3> directions;
+            for (const auto& light : *lights) directions.push_back(light.direction);
+            stage.lamps = named_lamps(directions);
+        } else {
+            lamps.reject("lp", "cannot be used: " + lights.error().message);
+        }
+    }
+    lamps.read("radius_m", stage.radius_m, 0.05, 100);
+    lamps.read("beam_exponent", stage.lamp_beam_exponent, 0, 1000);
+    if (!lamps.has("matte")) return;
+    stage.matte_lamps_m.clear();
+    for (auto& place : lamps.sections("matte")) {
+        std::array<double, 3> position_m{};
+        if (!place.has("position_m")) place.reject("position_m", "is missing");
+        place.read("position_m", position_m);
+        stage.matte_lamps_m.push_back({position_m[0], position_m[1], position_m[2]});
+    }
+}
+
+void read_chain(TomlSection chain, StageConfig& stage) {
+    chain.read("bits", stage.chain_bits, 1, OLS_CHAIN_BITS_MAX);
+    stage.chain_bit_of_lamp = identity_chain(stage.lamp_count());
+    chain.read("bit_of_lamp", stage.chain_bit_of_lamp, 0, stage.chain_bits - 1);
+    const auto& bits = stage.chain_bit_of_lamp;
+    if (int(bits.size()) != stage.lamp_count())
+        chain.reject("bit_of_lamp", fmt::format("lists {} bits for {} lamps (sphere lamps first, then the matte "
+                                                "board's): list one for each",
+                                                bits.size(), stage.lamp_count()));
+    if (std::set<int>(bits.begin(), bits.end()).size() != bits.size())
+        chain.reject("bit_of_lamp", "gives two lamps the same bit");
+    for (const int bit : bits)
+        if (bit >= stage.chain_bits)
+            return chain.reject("bits", fmt::format("is {}, but a lamp sits on bit {}", stage.chain_bits, bit));
+}
+
+CameraConfig read_camera(TomlSection& camera) {
+    CameraConfig config;
+    camera.read("source", config.source);
+    camera.read("width", config.width, 8, 16384);
+    camera.read("height", config.height, 8, 16384);
+    camera.read_choice<Cfa>("cfa", config.cfa,
+                            {{"none", Cfa::none},
+                             {"rggb", Cfa::rggb},
+                             {"bggr", Cfa::bggr},
+                             {"grbg", Cfa::grbg},
+                             {"gbrg", Cfa::gbrg},
+                             {"rgb", Cfa::rgb}});
+    camera.read("bits", config.bits, 8, 16);
+    config.white = double((1 << config.bits) - 1);
+    camera.read("black", config.black, 0, config.white);
+    camera.read("white", config.white, 1, double((1 << config.bits) - 1));
+    if (config.black >= config.white) camera.reject("black", "must be below white");
+    camera.read("noise_read_counts", config.noise.read_counts, 0, 1000);
+    camera.read("noise_shot", config.noise.shot, 0, 1000);
+    camera.read("trigger", config.trigger, 0, 3);
+    camera.read("position_m", config.position_m);
+    camera.read("look_at_m", config.look_at_m);
+    camera.read("up", config.up);
+    camera.read("vertical_fov_deg", config.vertical_fov_deg, 0.1, 170);
+    camera.read("vignetting", config.vignetting, 0, 1);
+    camera.read("counts_per_us", config.counts_per_us, 1e-6, 1e6);
+    return config;
+}
+
+}  // namespace
+
+StageConfig default_stage() {
+    StageConfig stage;
+    stage.lamps = named_lamps(stage_lamp_directions());
+    stage.matte_lamps_m = default_matte_lamps();
+    stage.chain_bit_of_lamp = identity_chain(stage.lamp_count());
+    stage.cameras.emplace_back();
+    return stage;
+}
+
+Result<StageConfig> read_stage(const std::string& path) {
+    auto file = TomlSection::open(path);
+    if (!file.ok()) return file.error();
+    StageConfig stage = default_stage();
+    read_lamps(file->section("lamps"), stage);
+    read_chain(file->section("chain"), stage);
+    file->section("board").read("link", stage.board);
+    file->read("calibration", stage.calibration_dir);
+    if (!stage.calibration_dir.empty()) stage.calibration_dir = file->resolve_path(stage.calibration_dir);
+    if (file->has("camera")) {
+        stage.cameras.clear();
+        for (auto& camera : file->sections("camera")) stage.cameras.push_back(read_camera(camera));
+    }
+    if (const Status status = file->finish(); !status.ok()) return status.error();
+    return stage;
+}
+
+}  // namespace ols

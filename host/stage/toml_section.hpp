@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// Strict reading of configuration files: every value is checked, every unknown key is an error, and every error names
+// file, line and key.
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "result.hpp"
+
+namespace ols {
+
+// A table of a TOML file. The read functions leave `value` as it is when the key is absent (so that the default stands)
+// or wrong; the first thing that is wrong anywhere in the file is kept and returned by finish().
+class TomlSection {
+  public:
+    // Parses a file and returns its root table.
+    static Result<TomlSection> open(const std::string& path);
+
+    bool has(const std::string& key) const;
+    void read(const std::string& key, double& value, double min, double max);
+    void read(const std::string& key, int& value, int min, int max);
+    void read(const std::string& key, bool& value);
+    void read(const std::string& key, std::string& value);
+    void read(const std::string& key, std::vector<int>& value, int min, int max);
+    void read(const std::string& key, std::array<double, 3>& value);
+
+    // A word that stands for a value, such as the name of a colour filter layout.
+    template <typename T>
+    void read_choice(const std::string& key, T& value, const std::map<std::string, T>& choices) {
+        std::string word, known;
+        read(key, word);
+        if (word.empty()) return;
+        for (const auto& [name, choice] : choices) {
+            if (name == word) {
+                value = choice;
+                return;
+            }
+            known += (known.empty() ? "" : ", ") + name;
+        }
+        reject(key, "is '" + word + "', which is none of: " + known);
+    }
+
+    // The table under `key`; an empty one when it is absent.
+    TomlSection section(const std::string& key);
+
+    // The tables of `[[key]]`; none when it is absent.
+    std::vector<TomlSection> sections(const std::string& key);
+
+    // Notes that a value is wrong in a way the read functions cannot know: `what` follows "file:line: key ".
+    void reject(const std::string& key, const std::string& what);
+
+    // The first error of the whole file: a wrong value, or a key that nobody has read.
+    Status finish() const;
+
+    // A path of the file made relative to the file's own folder.
+    std::string resolve_path(const std::string& path) const;
+
+  private:
+    struct File;
+    TomlSection(std::shared_ptr<File> file, const void* table, std::string prefix);
+    const void* find(const std::string& key);
+
+    std::shared_ptr<File> file_;
+    const void* table_;   // toml::table, kept out of this header: toml++ is slow to compile
+    std::string prefix_;  // "camera.", for messages
+};
+
+}  // namespace ols
