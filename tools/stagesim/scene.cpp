@@ -4,173 +4,141 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <sstream>
 
-#include "toml_keys.hpp"
+#include "stage/toml_section.hpp"
 
 namespace ols {
 
 namespace {
 
-class SceneReader {
-  public:
-    explicit SceneReader(const std::string& path) { scene_.path = path; }
+Vec3 read_vector(TomlSection& section, const std::string& key, Vec3 otherwise) {
+    std::array<double, 3> v = {otherwise.x, otherwise.y, otherwise.z};
+    section.read(key, v);
+    return {v[0], v[1], v[2]};
+}
 
-    Result<Scene> read(const toml::table& root) {
-        TomlKeys keys(root, "scene", scene_.path, error_);
-        scene_.samples = int(keys.number("samples", 4, 1, 256));
-        const int side = int(std::lround(std::sqrt(scene_.samples)));
-        if (side * side != scene_.samples) keys.complain("samples", "must be a square number: 1, 4, 9, 16, ...");
-        scene_.seed = uint64_t(keys.number("seed", 1, 0, 9e15));
-        if (const toml::table* clock = keys.table("clock")) read_clock(*clock);
-        if (const toml::array* materials = keys.tables("material"))
-            for (const toml::node& node : *materials) read_material(*node.as_table());
-        if (const toml::array* objects = keys.tables("object"))
-            for (const toml::node& node : *objects) read_object(*node.as_table());
-        if (const toml::table* board = keys.table("board")) read_board(*board);
-        keys.reject_unknown();
-        if (scene_.objects.empty()) keys.complain("object", "the scene is empty: add an [[object]] or a [board]");
-        if (!error_.empty()) return fail(error_);
-        return std::move(scene_);
+double read_number(TomlSection& section, const std::string& key, double otherwise, double low, double high) {
+    section.read(key, otherwise, low, high);
+    return otherwise;
+}
+
+Vec3 read_axis(TomlSection& section, const std::string& key, Vec3 otherwise) {
+    const Vec3 axis = read_vector(section, key, otherwise);
+    if (length(axis) > 1e-9) return axis;
+    section.reject(key, "must not be zero");
+    return otherwise;
+}
+
+Material read_material(TomlSection& section) {
+    Material material;
+    section.read("name", material.name);
+    if (material.name.empty()) section.reject("name", "is missing: objects name their material");
+    section.read_choice<MaterialType>(
+        "type", material.type,
+        {{"diffuse", MaterialType::diffuse}, {"skin", MaterialType::skin}, {"eye", MaterialType::eye}});
+    const Vec3 albedo = read_vector(section, "albedo", {0.5, 0.5, 0.5});
+    if (std::min({albedo.x, albedo.y, albedo.z}) < 0 || std::max({albedo.x, albedo.y, albedo.z}) > 1)
+        section.reject("albedo", "must lie from 0 to 1");
+    material.albedo = to_float3(albedo);
+    material.roughness = float(read_number(section, "roughness", material.roughness, 0.03, 1));
+    material.f0 = float(read_number(section, "f0", 0, 0, 1));
+    return material;
+}
+
+// A mesh is placed once, at reading; motion comes on top of it.
+std::optional<Mesh> read_placed_mesh(TomlSection& section, Vec3 position) {
+    std::string file;
+    section.read("mesh", file);
+    const float scale = float(read_number(section, "scale", 1, 1e-6, 1e6));
+    const Vec3 axis = read_axis(section, "rotation_axis", {0, 1, 0});
+    const Pose placement{rotation_about(axis, read_number(section, "rotation_deg", 0, -360, 360)), position};
+    auto mesh = read_obj(section.resolve_path(file));
+    if (!mesh) {
+        section.reject("mesh", "cannot be used: " + mesh.error().message);
+        return std::nullopt;
     }
+    for (Float3& p : mesh->positions) p = placement.point(p * scale);
+    for (Float3& n : mesh->normals) n = placement.turn(n);
+    return std::move(*mesh);
+}
 
-  private:
-    TomlKeys keys_of(const toml::table& table, const std::string& what) {
-        return TomlKeys(table, what, scene_.path, error_);
+Mesh read_quad(TomlSection quad, Vec3 position) {
+    const Vec3 normal = read_axis(quad, "normal", {0, 0, 1});
+    Vec3 up = read_axis(quad, "up", {0, 1, 0});
+    if (length(cross(up, normal)) < 1e-6 * length(up) * length(normal)) quad.reject("up", "is parallel to normal");
+    const double width = read_number(quad, "width_m", 1, 1e-4, 100), height = read_number(quad, "height_m", 1, 1e-4, 100);
+    return make_quad(position, normal, up, width, height);
+}
+
+void read_motion(TomlSection& section, Object& object) {
+    for (TomlSection& entry : section.sections("motion")) {
+        Keyframe keyframe;
+        entry.read("time_us", keyframe.time_us, 0, 1e15);
+        keyframe.translation_m = read_vector(entry, "translation_m", {});
+        const Vec3 axis = read_axis(entry, "axis", {0, 1, 0});
+        keyframe.rotation = rotation_about(axis, read_number(entry, "angle_deg", 0, -180, 180));
+        if (!object.motion.empty() && keyframe.time_us <= object.motion.back().time_us)
+            entry.reject("time_us", "must be later than the keyframe before");
+        object.motion.push_back(keyframe);
     }
+}
 
-    void read_clock(const toml::table& table) {
-        TomlKeys keys = keys_of(table, "clock");
-        scene_.clock.offset_ns = int64_t(keys.number("offset_ns", double(scene_.clock.offset_ns), 0, 9e15));
-        scene_.clock.drift_ppm = keys.number("drift_ppm", 0, -1000, 1000);
-        keys.reject_unknown();
+uint32_t find_material(const Scene& scene, TomlSection& section, const std::string& key, const std::string& name) {
+    for (size_t i = 0; i < scene.materials.size(); ++i)
+        if (scene.materials[i].name == name) return uint32_t(i);
+    section.reject(key, fmt::format("is '{}', but no [[material]] has that name", name));
+    return 0;
+}
+
+// Every group of the shape gets the object's material, or its own from the table `materials`.
+void read_materials_of(const Scene& scene, TomlSection& section, Object& object) {
+    std::vector<std::string> groups = {object.name};
+    if (const Mesh* mesh = std::get_if<Mesh>(&object.shape)) groups = mesh->groups;
+    std::string everywhere;
+    section.read("material", everywhere);
+    TomlSection by_group = section.section("materials");
+    for (const std::string& group : groups) {
+        std::string own;
+        by_group.read(group, own);
+        object.material_of_group.push_back(own.empty() ? find_material(scene, section, "material", everywhere)
+                                                       : find_material(scene, by_group, group, own));
     }
+}
 
-    void read_board(const toml::table& table) {
-        TomlKeys keys = keys_of(table, "board");
-        Board board;
-        board.center_m = keys.triple("center_m", board.center_m);
-        board.width_m = keys.number("width_m", board.width_m, 0.01, 10);
-        board.height_m = keys.number("height_m", board.height_m, 0.01, 10);
-        board.albedo = float(keys.number("albedo", board.albedo, 0, 1));
-        keys.reject_unknown();
-        add_board(scene_, board);
-    }
-
-    void read_material(const toml::table& table) {
-        TomlKeys keys = keys_of(table, "material");
-        Material material;
-        material.name = keys.text("name", "");
-        if (material.name.empty()) keys.complain("name", "every material needs a name");
-        const std::string type = keys.text("type", "diffuse");
-        if (type == "skin")
-            material.type = MaterialType::skin;
-        else if (type == "eye")
-            material.type = MaterialType::eye;
-        else if (type != "diffuse")
-            keys.complain("type", "must be diffuse, skin or eye");
-        const Vec3 albedo = keys.triple("albedo", {0.5, 0.5, 0.5});
-        for (const double a : {albedo.x, albedo.y, albedo.z})
-            if (a < 0 || a > 1) keys.complain("albedo", "must lie from 0 to 1");
-        material.albedo = to_float3(albedo);
-        material.roughness = float(keys.number("roughness", material.roughness, 0.03, 1));
-        material.f0 = float(keys.number("f0", 0, 0, 1));
-        keys.reject_unknown();
-        scene_.materials.push_back(std::move(material));
-    }
-
-    uint32_t find_material(TomlKeys& keys, const std::string& key, const std::string& name) {
-        for (size_t i = 0; i < scene_.materials.size(); ++i)
-            if (scene_.materials[i].name == name) return uint32_t(i);
-        keys.complain(key, fmt::format("there is no material '{}': add a [[material]] of that name", name));
-        return 0;
-    }
-
-    void read_object(const toml::table& table) {
-        TomlKeys keys = keys_of(table, "object");
-        Object object;
-        object.name = keys.text("name", fmt::format("object {}", scene_.objects.size() + 1));
-        const int shapes = int(keys.has("mesh")) + int(keys.has("sphere")) + int(keys.has("quad"));
-        if (shapes != 1) keys.complain("mesh", "an object is one of mesh, sphere and quad");
-        const Vec3 position = keys.triple("position_m", {});
-        if (keys.has("mesh")) read_mesh(keys, position, object);
-        if (const toml::table* sphere = keys.table("sphere")) {
-            TomlKeys sphere_keys = keys_of(*sphere, "object.sphere");
-            object.shape = Sphere{to_float3(position), float(sphere_keys.number("radius_m", 0.1, 1e-4, 10))};
-            object.is_convex = true;
-            sphere_keys.reject_unknown();
-        }
-        if (const toml::table* quad = keys.table("quad")) {
-            TomlKeys quad_keys = keys_of(*quad, "object.quad");
-            const Vec3 normal = quad_keys.triple("normal", {0, 0, 1}), up = quad_keys.triple("up", {0, 1, 0});
-            if (length(cross(up, normal)) < 1e-6) quad_keys.complain("up", "must not be parallel to normal");
-            object.shape = make_quad(position, normal, up, quad_keys.number("width_m", 1, 1e-4, 100),
-                                     quad_keys.number("height_m", 1, 1e-4, 100));
-            object.is_convex = true;
-            quad_keys.reject_unknown();
-        }
-        read_materials_of(keys, object);
-        if (const toml::array* motion = keys.tables("motion")) read_motion(*motion, object);
-        keys.reject_unknown();
-        scene_.objects.push_back(std::move(object));
-    }
-
-    void read_mesh(TomlKeys& keys, Vec3 position, Object& object) {
-        const auto folder = std::filesystem::path(scene_.path).parent_path();
-        const auto file = (folder / keys.text("mesh", "")).lexically_normal();
-        const double scale = keys.number("scale", 1, 1e-6, 1e6);
-        const Vec3 axis = keys.triple("rotation_axis", {0, 1, 0});
-        const double angle = keys.number("rotation_deg", 0, -360, 360);
-        if (length(axis) < 1e-9) keys.complain("rotation_axis", "must not be zero");
-        if (!error_.empty()) return;
-        auto mesh = read_obj(file);
-        if (!mesh) {
-            error_ = mesh.error().message;
-            return;
-        }
-        const Pose placement{rotation_about(axis, angle), position};
-        for (Float3& p : mesh->positions) p = placement.point(p * float(scale));
-        for (Float3& n : mesh->normals) n = placement.turn(n);
+void read_object(Scene& scene, TomlSection& section) {
+    Object object;
+    object.name = fmt::format("object {}", scene.objects.size() + 1);
+    section.read("name", object.name);
+    if (section.has("mesh") + section.has("sphere") + section.has("quad") != 1)
+        return section.reject("mesh", "an object is one of mesh, sphere and quad");
+    const Vec3 position = read_vector(section, "position_m", {});
+    if (section.has("mesh")) {
+        auto mesh = read_placed_mesh(section, position);
+        if (!mesh) return;
         object.shape = std::move(*mesh);
+    } else if (section.has("sphere")) {
+        TomlSection sphere = section.section("sphere");
+        object.shape = Sphere{to_float3(position), float(read_number(sphere, "radius_m", 0.1, 1e-4, 10))};
+        object.is_convex = true;
+    } else {
+        object.shape = read_quad(section.section("quad"), position);
+        object.is_convex = true;
     }
+    read_materials_of(scene, section, object);
+    read_motion(section, object);
+    scene.objects.push_back(std::move(object));
+}
 
-    void read_materials_of(TomlKeys& keys, Object& object) {
-        const std::string everywhere = keys.text("material", "");
-        const toml::table* by_group = keys.table("materials");
-        std::vector<std::string> groups = {object.name};
-        if (const Mesh* mesh = std::get_if<Mesh>(&object.shape)) groups = mesh->groups;
-        for (const std::string& group : groups) {
-            const auto own = by_group ? (*by_group)[group].value<std::string>() : std::nullopt;
-            object.material_of_group.push_back(
-                find_material(keys, own ? "materials" : "material", own ? *own : everywhere));
-        }
-        if (!by_group) return;
-        for (const auto& [group, name] : *by_group)
-            if (std::find(groups.begin(), groups.end(), group.str()) == groups.end())
-                keys.complain("materials", fmt::format("the mesh has no group '{}'", std::string(group.str())));
-    }
-
-    void read_motion(const toml::array& motion, Object& object) {
-        for (const toml::node& node : motion) {
-            TomlKeys keys = keys_of(*node.as_table(), "object.motion");
-            Keyframe keyframe;
-            keyframe.time_us = keys.number("time_us", 0, 0, 1e15);
-            keyframe.translation_m = keys.triple("translation_m", {});
-            const Vec3 axis = keys.triple("axis", {0, 1, 0});
-            if (length(axis) < 1e-9) keys.complain("axis", "must not be zero");
-            keyframe.rotation = rotation_about(axis, keys.number("angle_deg", 0, -180, 180));
-            if (!object.motion.empty() && keyframe.time_us <= object.motion.back().time_us)
-                keys.complain("time_us", "keyframes must ascend in time");
-            keys.reject_unknown();
-            object.motion.push_back(keyframe);
-        }
-    }
-
-    Scene scene_;
-    std::string error_;
-};
+void read_board(Scene& scene, TomlSection section) {
+    Board board;
+    board.center_m = read_vector(section, "center_m", board.center_m);
+    section.read("width_m", board.width_m, 0.01, 10);
+    section.read("height_m", board.height_m, 0.01, 10);
+    board.albedo = float(read_number(section, "albedo", board.albedo, 0, 1));
+    add_board(scene, board);
+}
 
 }  // namespace
 
@@ -189,12 +157,23 @@ void add_board(Scene& scene, const Board& board) {
 }
 
 Result<Scene> read_scene(const std::string& path) {
-    if (!std::filesystem::is_regular_file(path)) return fail("cannot open scene '" + path + "': check the path");
-    try {
-        return SceneReader(path).read(toml::parse_file(path));
-    } catch (const toml::parse_error& e) {
-        return fail(fmt::format("{}:{}: {}", path, e.source().begin.line, e.description()));
-    }
+    auto file = TomlSection::open(path);
+    if (!file) return file.error();
+    Scene scene;
+    scene.path = path;
+    file->read("samples", scene.samples, 1, 256);
+    const int side = int(std::lround(std::sqrt(scene.samples)));
+    if (side * side != scene.samples) file->reject("samples", "must be a square number: 1, 4, 9, 16, ...");
+    scene.seed = uint64_t(read_number(*file, "seed", 1, 0, 9e15));
+    TomlSection clock = file->section("clock");
+    scene.clock.offset_ns = int64_t(read_number(clock, "offset_ns", double(scene.clock.offset_ns), 0, 9e15));
+    clock.read("drift_ppm", scene.clock.drift_ppm, -1000, 1000);
+    for (TomlSection& material : file->sections("material")) scene.materials.push_back(read_material(material));
+    for (TomlSection& object : file->sections("object")) read_object(scene, object);
+    if (file->has("board")) read_board(scene, file->section("board"));
+    if (const Status status = file->finish(); !status) return status.error();
+    if (scene.objects.empty()) return fail("'" + path + "': the scene is empty: add an [[object]] or a [board]");
+    return scene;
 }
 
 }  // namespace ols

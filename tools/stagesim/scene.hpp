@@ -44,8 +44,8 @@ struct Object {
 };
 
 struct Board {
-    Vec3 center_m{0, 0, -0.35};
-    double width_m = 0.6, height_m = 0.4;  // Wenger section 4: 60 x 40 cm
+    Vec3 center_m{0, 0, -0.5};
+    double width_m = 0.6, height_m = 0.4;  // Wenger 3.2
     float albedo = 0.32f;                  // 32 % grey
 };
 
