@@ -19,16 +19,19 @@ export class UsbSocket {
   #inFlight = new Map(); // tag -> handle of the host
   #host;
   #log;
+  #onClient;
 
   /**
    * @param {() => import('./usb_host.mjs').UsbHost} host the chip's at this moment
    * @param {() => void} onActivity called when something has come in
+   * @param {(connected: boolean) => void} onClient called when a client has come or gone
    */
-  constructor(path, host, onActivity, log) {
+  constructor(path, host, onActivity, log, onClient = () => {}) {
     this.#path = path;
     this.#host = host;
     this.#log = log;
     this.onActivity = onActivity;
+    this.#onClient = onClient;
     this.#server = createServer((socket) => this.#accept(socket));
   }
 
@@ -68,6 +71,7 @@ export class UsbSocket {
       return;
     }
     this.#client = socket;
+    this.#onClient(true);
     socket.on('data', (bytes) => {
       if (socket === this.#client) this.#receive(bytes);
     });
@@ -83,6 +87,7 @@ export class UsbSocket {
   }
 
   #forget() {
+    if (this.#client !== null) this.#onClient(false);
     this.#client = null;
     this.#input = Buffer.alloc(0);
     this.#inFlight.clear();
