@@ -15,7 +15,7 @@ namespace ols {
 // A trigger was high from `rise` to `fall` (board ticks); in each segment one pattern was lit.
 struct ExposureMessage {
     struct Segment {
-        uint64_t on, off;          // board ticks
+        uint64_t on, off;           // board ticks
         std::vector<uint8_t> bits;  // one a chain bit, 0 or 1
     };
     int trigger = 0;

@@ -28,8 +28,8 @@ enum class FaultKind {
 struct Fault {
     FaultKind kind;
     uint32_t camera = 0;
-    uint64_t trigger = 0;  // how many triggers this camera had before, from 0
-    uint64_t by = 1;       // late: frames
+    uint64_t trigger = 0;    // how many triggers this camera had before, from 0
+    uint64_t by = 1;         // late: frames
     bool keep_clock = true;  // restart_camera
 };
 

@@ -13,9 +13,8 @@ namespace {
 
 RTCGeometry mesh_geometry(RTCDevice device, const Mesh& mesh, const Pose& pose) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<Float3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                  RTC_FORMAT_FLOAT3, sizeof(Float3),
-                                                                  mesh.positions.size()));
+    auto* vertices = static_cast<Float3*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Float3), mesh.positions.size()));
     for (size_t i = 0; i < mesh.positions.size(); ++i) vertices[i] = pose.point(mesh.positions[i]);
     auto* triangles = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), mesh.triangles.size()));
@@ -81,8 +80,7 @@ std::optional<SurfaceHit> Geometry::intersect(Float3 origin, Float3 direction) c
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit ray{};
-    ray.ray = {origin.x,    origin.y,    origin.z, 0, direction.x, direction.y, direction.z, 0,
-               INFINITY, ~0u,         0,        0};
+    ray.ray = {origin.x, origin.y, origin.z, 0, direction.x, direction.y, direction.z, 0, INFINITY, ~0u, 0, 0};
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(state_->embree, &context, &ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;

@@ -37,7 +37,8 @@ std::optional<T> number(std::string_view word) {
 
 std::optional<Float3> triple(const Words& words, size_t first) {
     if (words.size() < first + 3) return std::nullopt;
-    const auto x = number<float>(words[first]), y = number<float>(words[first + 1]), z = number<float>(words[first + 2]);
+    const auto x = number<float>(words[first]), y = number<float>(words[first + 1]),
+               z = number<float>(words[first + 2]);
     if (!x || !y || !z || !std::isfinite(*x) || !std::isfinite(*y) || !std::isfinite(*z)) return std::nullopt;
     return Float3{*x, *y, *z};
 }
@@ -152,9 +153,10 @@ Result<Mesh> read_obj(const std::string& path) {
         const std::string_view line = std::string_view(text).substr(begin, end - begin);
         ++number;
         if (!parser.line(line))
-            return fail(fmt::format("{}:{}: '{}' is no valid OBJ line: numbers must be finite, indices must name earlier "
-                                    "vertices, and either all or no corners have normals",
-                                    path, number, line.substr(0, 60)));
+            return fail(
+                fmt::format("{}:{}: '{}' is no valid OBJ line: numbers must be finite, indices must name earlier "
+                            "vertices, and either all or no corners have normals",
+                            path, number, line.substr(0, 60)));
         begin = end + 1;
     }
     Mesh mesh = parser.take();

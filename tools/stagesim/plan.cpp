@@ -54,7 +54,8 @@ json foretell(const Setup& setup, const std::set<std::string>& disabled) {
     renderer.expose(lit_us, 0, 1, 0);
     const Cost& cost = renderer.cost();
 
-    const double by_pixels = double(setup.camera.width) * setup.camera.height / (small_camera.width * small_camera.height);
+    const double by_pixels =
+        double(setup.camera.width) * setup.camera.height / (small_camera.width * small_camera.height);
     const double by_lamps = shaded ? double(lit_us.size()) / double(shaded) : 0;
     json plan = {{"effects", effects_json(renderer.effects())},
                  {"primary_rays", uint64_t(setup.camera.width) * setup.camera.height * setup.scene.samples},
@@ -66,7 +67,8 @@ json foretell(const Setup& setup, const std::set<std::string>& disabled) {
         effect["evaluations"] = uint64_t(double(effect["evaluations"]) * scale);
     }
     const double sums = (cost.sums_s - before_sums) * by_pixels * by_lamps / 2;
-    plan["seconds"] = {{"visibility", cost.visibility_s * by_pixels},
+    plan["seconds"] = {{"build", cost.build_s},
+                       {"visibility", cost.visibility_s * by_pixels},
                        {"lamps", cost.lamps_s * by_pixels * by_lamps},
                        {"exposure", sums + (cost.sensor_s - before_sensor) * by_pixels}};
     return plan;
@@ -81,7 +83,8 @@ json account(const Renderer& renderer) {
             {"placings", cost.placings},
             {"exposures", cost.exposures},
             {"seconds",
-             {{"visibility", cost.visibility_s},
+             {{"build", cost.build_s},
+              {"visibility", cost.visibility_s},
               {"lamps", cost.lamps_s},
               {"exposure", (cost.sums_s + cost.sensor_s) / exposures},
               {"sums", cost.sums_s},
@@ -108,11 +111,13 @@ std::string plan_text(const json& foretold, const json& actual) {
         text += '\n';
     };
     const bool moving = foretold["moving"];
+    line("building the ray hierarchy", "build");
     line(moving ? "visibility, each time the scene moved" : "visibility, once", "visibility");
     line(moving ? "all lamps, each time the scene moved" : "all lamps, once", "lamps");
     line("an exposure with half of the lamps", "exposure");
-    if (ran) text += fmt::format("{} exposures, scene placed {} times\n", actual["exposures"].get<uint64_t>(),
-                                 actual["placings"].get<uint64_t>());
+    if (ran)
+        text += fmt::format("{} exposures, scene placed {} times\n", actual["exposures"].get<uint64_t>(),
+                            actual["placings"].get<uint64_t>());
     return text;
 }
 

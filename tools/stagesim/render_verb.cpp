@@ -61,8 +61,8 @@ Result<std::vector<Float3>> environment_weights(const RenderOptions& options, co
     for (const LightPosition& lamp : stage.lamps) directions.push_back(lamp.direction);
     const auto cells = SphereCells::make(directions);
     if (!cells) return cells.error();
-    const LampWeights weights = integrate_environment(
-        *environment, *cells, {options.rotate_deg * std::numbers::pi / 180, options.exposure_ev});
+    const LampWeights weights =
+        integrate_environment(*environment, *cells, {options.rotate_deg * std::numbers::pi / 180, options.exposure_ev});
     std::vector<Float3> result(stage.lamp_count());
     for (size_t i = 0; i < weights.irradiance.size(); ++i) {
         const Rgb& w = weights.irradiance[i];
@@ -76,7 +76,8 @@ Result<std::vector<Float3>> chosen_weights(const RenderOptions& options, const S
     if (!options.env.empty()) return environment_weights(options, stage);
     if (!options.weights.empty()) return read_weights(options.weights, count);
     std::vector<Float3> weights(count);
-    if (options.all_lamps) std::fill(weights.begin(), weights.begin() + std::ptrdiff_t(stage.lamps.size()), Float3{1, 1, 1});
+    if (options.all_lamps)
+        std::fill(weights.begin(), weights.begin() + std::ptrdiff_t(stage.lamps.size()), Float3{1, 1, 1});
     for (const int lamp : options.lamps) {
         if (lamp < 0 || size_t(lamp) >= count)
             return fail(fmt::format("--lamps: there is no lamp {}: the stage has 0 to {}", lamp, count - 1));
@@ -113,7 +114,8 @@ Status render_olat(const RenderOptions& options, Renderer& renderer, const Camer
         std::vector<Float3> weights(renderer.lamp_count());
         weights[lamp] = {1, 1, 1};
         const std::string path = fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
-        if (const Status s = write_picture(options, renderer.light(weights, options.time_us), camera, path); !s) return s;
+        if (const Status s = write_picture(options, renderer.light(weights, options.time_us), camera, path); !s)
+            return s;
         show_progress("lamps", double(lamp + 1) / double(renderer.lamp_count()));
     }
     return Done{};
@@ -135,10 +137,11 @@ Status render(const RenderOptions& options) {
 void add_render_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<RenderOptions>();
     CLI::App* verb = app.add_subcommand("render", "render a scene without sensor and noise");
-    verb->footer(fmt::format("Units: reflectance is pi L / E, 1 for white facing a lamp at the stage centre; counts are the "
-                             "camera's counts a microsecond, with vignetting.\nPNG: {}.\n"
-                             "example: stagesim render tools/stagesim/scenes/head.toml --lamps 0,5 -o two.exr",
-                             tone_curve_text));
+    verb->footer(
+        fmt::format("Units: reflectance is pi L / E, 1 for white facing a lamp at the stage centre; counts are the "
+                    "camera's counts a microsecond, with vignetting.\nPNG: {}.\n"
+                    "example: stagesim render tools/stagesim/scenes/head.toml --lamps 0,5 -o two.exr",
+                    tone_curve_text));
     add_input_options(*verb, options->inputs);
     auto* light = verb->add_option_group("light", "which lamps are on");
     light->add_option("--lamps", options->lamps, "these lamps, each at 1")->delimiter(',');
@@ -148,7 +151,8 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
     light->require_option(1);
     verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
-    verb->add_option("--rotate", options->rotate_deg, "turn the environment about +Y, degrees: light from +Z moves to +X");
+    verb->add_option("--rotate", options->rotate_deg,
+                     "turn the environment about +Y, degrees: light from +Z moves to +X");
     verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
     verb->add_option("--time-us", options->time_us, "moment of a moving scene");
     verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));

@@ -13,9 +13,7 @@ namespace {
 class Stopwatch {
   public:
     explicit Stopwatch(double& sum) : sum_(sum) {}
-    ~Stopwatch() {
-        sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-    }
+    ~Stopwatch() { sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count(); }
 
   private:
     double& sum_;
@@ -34,11 +32,14 @@ void Renderer::place(double time_us) {
     for (const Object& object : setup_.scene.objects) poses.push_back(pose_at(object.motion, time_us));
     if (geometry_ && poses == poses_) return;
 
-    const Stopwatch stopwatch(cost_.visibility_s);
-    const CameraConfig& camera = setup_.camera;
     poses_ = std::move(poses);
     images_.reset();
-    geometry_ = std::make_unique<Geometry>(setup_.scene, time_us);
+    {
+        const Stopwatch stopwatch(cost_.build_s);
+        geometry_ = std::make_unique<Geometry>(setup_.scene, time_us);
+    }
+    const Stopwatch stopwatch(cost_.visibility_s);
+    const CameraConfig& camera = setup_.camera;
     VisiblePoints points = find_visible_points(setup_.scene, *geometry_, Pinhole(camera), camera.width, camera.height,
                                                setup_.scene.samples);
     ++cost_.placings;

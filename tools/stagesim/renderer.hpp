@@ -12,12 +12,12 @@ namespace ols {
 
 // What rendering took, for `plan`.
 struct Cost {
-    uint64_t placings = 0;       // of the scene: 1 for a still one
+    uint64_t placings = 0;  // of the scene: 1 for a still one
     uint64_t primary_rays = 0;
-    uint64_t visible_points = 0; // of the last placing
-    uint64_t lamp_points = 0;    // visible points times lamps shaded
+    uint64_t visible_points = 0;  // of the last placing
+    uint64_t lamp_points = 0;     // visible points times lamps shaded
     uint64_t exposures = 0;
-    double visibility_s = 0, lamps_s = 0, sums_s = 0, sensor_s = 0;
+    double build_s = 0, visibility_s = 0, lamps_s = 0, sums_s = 0, sensor_s = 0;
 };
 
 class Renderer {

@@ -98,12 +98,12 @@ class StageRun {
 
     Status add_camera(uint32_t index, const std::vector<Fault>& faults) {
         const CameraConfig& config = inputs_.stage.cameras[index];
-        setups_.push_back(std::make_unique<Setup>(
-            Setup{inputs_.scene, inputs_.stage, config, options_.camera_model == "on"}));
+        setups_.push_back(
+            std::make_unique<Setup>(Setup{inputs_.scene, inputs_.stage, config, options_.camera_model == "on"}));
         // Some 64 MB of frames, so that the reader may pause without the board standing still.
-        const uint64_t frame_bytes = uint64_t(config.width) * config.height * 3 * sizeof(float);
-        const uint32_t slots = uint32_t(std::clamp<uint64_t>((64 << 20) / frame_bytes, 8, 256));
-        auto ring = RingWriter::create(fmt::format("{}/cam{}.ring", options_.work, index), slots, frame_bytes);
+        const uint64_t bytes = frame_bytes(*setups_.back(), options_.inputs.disabled_set());
+        const uint32_t slots = uint32_t(std::clamp<uint64_t>((64 << 20) / bytes, 8, 256));
+        auto ring = RingWriter::create(fmt::format("{}/cam{}.ring", options_.work, index), slots, bytes);
         if (!ring) return ring.error();
         foretold_.push_back(foretell(*setups_.back(), options_.inputs.disabled_set()));
         cameras_.push_back(std::make_unique<VirtualCamera>(*setups_.back(), options_.inputs.disabled_set(), index,
@@ -117,17 +117,19 @@ class StageRun {
     }
 
     Result<BoardProcess> start_board() {
-        const std::string image = find_part(options_.image, "build/firmware/stage.elf", "share/open-light-stage/stage.elf");
-        const std::string program =
-            find_part(options_.board_program, "tools/stagesim/board/board.mjs", "share/open-light-stage/board/board.mjs");
+        const std::string image =
+            find_part(options_.image, "build/firmware/stage.elf", "share/open-light-stage/stage.elf");
+        const std::string program = find_part(options_.board_program, "tools/stagesim/board/board.mjs",
+                                              "share/open-light-stage/board/board.mjs");
         if (!std::filesystem::exists(image))
             return fail("there is no firmware image '" + image + "': build it (`make firmware`) or give --image");
         if (!std::filesystem::exists(program)) return fail("there is no emulated board '" + program + "'");
-        std::vector<std::string> command = {"node",        program,        "--image",
-                                            image,         "--usb",        options_.work + "/board.sock",
-                                            "--exposures", options_.work + "/exposures.sock",
-                                            "--pace",      options_.pace,  "--chain-bits",
-                                            std::to_string(inputs_.stage.chain_bits)};
+        std::vector<std::string> command = {"node",         program,
+                                            "--image",      image,
+                                            "--usb",        options_.work + "/board.sock",
+                                            "--exposures",  options_.work + "/exposures.sock",
+                                            "--pace",       options_.pace,
+                                            "--chain-bits", std::to_string(inputs_.stage.chain_bits)};
         if (!options_.vcd.empty()) command.insert(command.end(), {"--vcd", options_.vcd});
         for (const std::string& fault : options_.board_faults) command.insert(command.end(), {"--inject", fault});
         return BoardProcess::start(command);
@@ -238,7 +240,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--pace", options->pace, "virtual: never outrun the reader; wall: drop and count")
         ->check(CLI::IsMember({"virtual", "wall"}));
     verb->add_option("--inject", options->faults, "faults.toml: faults of cameras and delivery");
-    verb->add_option("--board-inject", options->board_faults, "fault of the board, FAULT@WHEN as board.mjs --help says");
+    verb->add_option("--board-inject", options->board_faults,
+                     "fault of the board, FAULT@WHEN as board.mjs --help says");
     verb->add_option("--camera-model", options->camera_model,
                      "off: float RGB counts without noise, mosaic, quantisation, saturation")
         ->check(CLI::IsMember({"on", "off"}));

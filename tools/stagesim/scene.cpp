@@ -68,7 +68,8 @@ Mesh read_quad(TomlSection quad, Vec3 position) {
     const Vec3 normal = read_axis(quad, "normal", {0, 0, 1});
     Vec3 up = read_axis(quad, "up", {0, 1, 0});
     if (length(cross(up, normal)) < 1e-6 * length(up) * length(normal)) quad.reject("up", "is parallel to normal");
-    const double width = read_number(quad, "width_m", 1, 1e-4, 100), height = read_number(quad, "height_m", 1, 1e-4, 100);
+    const double width = read_number(quad, "width_m", 1, 1e-4, 100),
+                 height = read_number(quad, "height_m", 1, 1e-4, 100);
     return make_quad(position, normal, up, width, height);
 }
 

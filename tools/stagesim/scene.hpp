@@ -39,7 +39,7 @@ struct Object {
     std::variant<Mesh, Sphere> shape;
     std::vector<uint32_t> material_of_group;  // a sphere has one group
     std::vector<Keyframe> motion;
-    bool is_board = false;  // the matte board: lit by the matte lamps
+    bool is_board = false;   // the matte board: lit by the matte lamps
     bool is_convex = false;  // casts no shadow on itself
 };
 

@@ -61,13 +61,14 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     return look;
 }
 
-// Angles from the eye's axis over pi; make_assets puts the limbus where the cornea meets the globe, asin(1/2).
+// Angles from the eye's axis over pi; the head.py of assets puts the limbus where the cornea meets the globe, asin(1/2).
 constexpr float limbus_angle = 1.0f / 6, pupil_angle = 0.055f;
 
 Look eye(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     const float angle = mask.x;
     const float veins = std::max(0.0f, fractal_noise3(p * 700, 3, 0.6f, 21) - 0.15f);
-    const Float3 sclera = Float3{0.62f, 0.57f, 0.53f} * mix({1, 1, 1}, {0.95f, 0.62f, 0.56f}, std::min(1.0f, 1.6f * veins));
+    const Float3 sclera =
+        Float3{0.62f, 0.57f, 0.53f} * mix({1, 1, 1}, {0.95f, 0.62f, 0.56f}, std::min(1.0f, 1.6f * veins));
     // Iris: fibres run outwards, lighter around the pupil, dark at the limbus.
     const float across = (angle - pupil_angle) / (limbus_angle - pupil_angle);
     const float fibre = noise3({p.x * 2200, p.y * 2200, p.z * 300}, 22);

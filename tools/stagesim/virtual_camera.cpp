@@ -38,6 +38,12 @@ Frame make_frame(const Exposure& exposure, const CameraConfig& camera, const Eff
     return frame;
 }
 
+uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled) {
+    const EffectSet effects(setup, disabled);
+    const uint64_t samples = uint64_t(setup.camera.width) * setup.camera.height * (effects.mosaic() ? 1 : 3);
+    return samples * (effects.active("quantisation") ? sizeof(uint16_t) : sizeof(float));
+}
+
 VirtualCamera::VirtualCamera(const Setup& setup, const std::set<std::string>& disabled, uint32_t index, RingWriter ring,
                              const std::vector<Fault>& faults, bool wait_for_reader, const std::atomic<bool>& cancelled)
     : setup_(setup),
@@ -59,8 +65,8 @@ void VirtualCamera::expose(const ExposureMessage& message) {
     if (delivery_.strikes(FaultKind::drop_trigger, trigger)) return;
 
     const double middle_us = (double(message.rise - first_rise_) + double(message.fall - first_rise_)) / 2;
-    const Exposure exposure = renderer_.expose(lit_microseconds(message, setup_.stage),
-                                               middle_us * microseconds_per_tick, trigger, index_);
+    const Exposure exposure =
+        renderer_.expose(lit_microseconds(message, setup_.stage), middle_us * microseconds_per_tick, trigger, index_);
     Frame frame = make_frame(exposure, setup_.camera, renderer_.effects());
     frame.stamp = {next_frame_id_++, camera_time_ns(clock_, message.rise - clock_epoch_tick_)};
     delivery_.send(std::move(frame), trigger, [this](Frame f) { deliver(std::move(f)); });

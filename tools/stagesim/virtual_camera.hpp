@@ -20,6 +20,9 @@ uint64_t camera_time_ns(const CameraClock& clock, uint64_t tick);
 // white. Without quantisation: 32-bit counts above black, so black is 0, and no white (the largest float).
 Frame make_frame(const Exposure& exposure, const CameraConfig& camera, const EffectSet& effects);
 
+// The size of such a frame.
+uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled);
+
 class VirtualCamera {
   public:
     // `setup` must outlive the camera.

@@ -20,10 +20,10 @@ struct VisiblePoints {
 
     std::vector<float> position[3], normal[3], view[3];  // view: unit, to the camera
     std::vector<float> albedo[3], roughness, f0;
-    std::vector<float> weight;        // 1 / samples a pixel, or 0
-    std::vector<uint32_t> pixel;      // index into `pixels`
+    std::vector<float> weight;    // 1 / samples a pixel, or 0
+    std::vector<uint32_t> pixel;  // index into `pixels`
     std::vector<uint8_t> on_board;
-    std::vector<uint32_t> pixels;     // y * width + x of every pixel that sees anything
+    std::vector<uint32_t> pixels;  // y * width + x of every pixel that sees anything
     std::vector<Chunk> chunks;
     int width = 0, height = 0, samples = 0;
 

@@ -20,8 +20,8 @@ uint32_t Beam::apply(LightPacket& packet) const {
     for (int i = 0; i < packet_size; ++i) {
         if (packet.irradiance[i] <= 0) continue;
         const uint32_t p = packet.first + i;
-        const Float3 from_lamp = Float3{points.position[0][p], points.position[1][p], points.position[2][p]} -
-                                 lamp.position_m;
+        const Float3 from_lamp =
+            Float3{points.position[0][p], points.position[1][p], points.position[2][p]} - lamp.position_m;
         const float cosine = -dot(from_lamp, lamp.direction) / length(from_lamp);
         packet.irradiance[i] *= std::pow(std::max(0.0f, cosine), lamp.beam_exponent);
         ++evaluations;

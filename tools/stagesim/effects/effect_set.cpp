@@ -37,7 +37,8 @@ std::vector<std::unique_ptr<Effect>> all_effects(const Setup& setup, const std::
 EffectSet::EffectSet(const Setup& setup, const std::set<std::string>& disabled) {
     effects_ = all_effects(setup, disabled);
     for (auto& effect : effects_) {
-        rows_.push_back({effect->name(), effect->caller(setup), effect->evaluation(), disabled.contains(effect->name())});
+        rows_.push_back(
+            {effect->name(), effect->caller(setup), effect->evaluation(), disabled.contains(effect->name())});
         if (!rows_.back().active()) effect.reset();
         if (auto* light = dynamic_cast<LightEffect*>(effect.get()))
             (light->stage() == LightEffect::Stage::arrive ? arriving_ : reflecting_).push_back(light);
@@ -61,7 +62,8 @@ std::vector<EffectSet::Row> EffectSet::rows() const {
 }
 
 std::vector<std::string> effect_names() {
-    return {"motion", "falloff", "beam", "shadows", "specular", "stray", "mosaic", "vignetting", "noise", "quantisation"};
+    return {"motion", "falloff", "beam",       "shadows", "specular",
+            "stray",  "mosaic",  "vignetting", "noise",   "quantisation"};
 }
 
 }  // namespace ols

@@ -25,8 +25,7 @@ uint32_t Falloff::apply(LightPacket& packet) const {
         packet.to_lamp[1][i] = y * inverse;
         packet.to_lamp[2][i] = z * inverse;
         packet.distance_m[i] = distance;
-        const float cosine =
-            (x * points.normal[0][p] + y * points.normal[1][p] + z * points.normal[2][p]) * inverse;
+        const float cosine = (x * points.normal[0][p] + y * points.normal[1][p] + z * points.normal[2][p]) * inverse;
         packet.irradiance[i] = packet.receives[i] * std::max(0.0f, cosine) * lamp.reach_m * lamp.reach_m / squared;
     }
     return packet_size;

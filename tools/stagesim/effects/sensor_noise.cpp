@@ -26,8 +26,8 @@ void SensorNoise::apply(Exposure& exposure) {
     tbb::parallel_for(size_t(0), (counts.size() + block - 1) / block, [&](size_t b) {
         const size_t end = std::min(counts.size(), (b + 1) * block);
         for (size_t i = b * block; i < end; i += 4) {
-            const auto normals = standard_normals(philox4x32(
-                {uint32_t(i / 4), 0, uint32_t(exposure.number), uint32_t(exposure.number >> 32)}, key));
+            const auto normals = standard_normals(
+                philox4x32({uint32_t(i / 4), 0, uint32_t(exposure.number), uint32_t(exposure.number >> 32)}, key));
             for (size_t k = 0; k < std::min<size_t>(4, end - i); ++k) {
                 float& mu = counts[i + k];
                 mu += (read + shot * std::sqrt(std::max(0.0f, mu))) * normals[k];

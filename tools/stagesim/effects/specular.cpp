@@ -20,8 +20,8 @@ float ggx(float n_h, float n_l, float n_v, float h_v, float alpha, float f0) {
     const float a2 = alpha * alpha;
     const float d = n_h * n_h * (a2 - 1) + 1;
     const float distribution = a2 / (std::numbers::pi_v<float> * d * d);
-    const float visibility = 0.5f / (n_l * std::sqrt(n_v * n_v * (1 - a2) + a2) +
-                                     n_v * std::sqrt(n_l * n_l * (1 - a2) + a2));
+    const float visibility =
+        0.5f / (n_l * std::sqrt(n_v * n_v * (1 - a2) + a2) + n_v * std::sqrt(n_l * n_l * (1 - a2) + a2));
     const float m = 1 - h_v, m2 = m * m;
     return distribution * visibility * (f0 + (1 - f0) * m2 * m2 * m);
 }

@@ -68,8 +68,8 @@ void StrayLight::find_shares(const VisiblePoints& points, const Geometry& geomet
         const auto& chunk = points.chunks[c];
         for (uint32_t i = chunk.first_point; i < chunk.first_point + chunk.points; ++i) {
             const Float3 n{points.normal[0][i], points.normal[1][i], points.normal[2][i]};
-            const Float3 x = Float3{points.position[0][i], points.position[1][i], points.position[2][i]} +
-                             n * shadow_offset_m;
+            const Float3 x =
+                Float3{points.position[0][i], points.position[1][i], points.position[2][i]} + n * shadow_offset_m;
             uint32_t count = 0;
             for (uint32_t p = 0; p < patches_.size() && !points.on_board[i]; ++p) {
                 const Float3 way = patches_[p].center - x;

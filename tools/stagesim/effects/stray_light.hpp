@@ -34,9 +34,9 @@ class StrayLight : public LightEffect {
     const Scene& scene_;
     bool cast_shadows_;
     std::vector<Patch> patches_;
-    std::vector<float> radiosity_;      // [lamp * patches + patch], in units of the lamp's irradiance at its aim
-    std::vector<Share> shares_;         // of all points, one after the other
-    std::vector<uint32_t> first_share_; // a point's first, and one past the last point's
+    std::vector<float> radiosity_;       // [lamp * patches + patch], in units of the lamp's irradiance at its aim
+    std::vector<Share> shares_;          // of all points, one after the other
+    std::vector<uint32_t> first_share_;  // a point's first, and one past the last point's
 };
 
 }  // namespace ols

@@ -3,6 +3,7 @@
 #include "vignetting.hpp"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 namespace ols {
 
@@ -18,11 +19,12 @@ float Vignetting::factor(float strength, int x, int y, int width, int height) {
 
 void Vignetting::apply(Exposure& exposure) {
     Image& image = exposure.counts;
-    for (int y = 0; y < image.height; ++y)
+    tbb::parallel_for(0, image.height, [&](int y) {
         for (int x = 0; x < image.width; ++x) {
             const float f = factor(strength_, x, y, image.width, image.height);
             for (int c = 0; c < image.channels; ++c) image.at(x, y, c) *= f;
         }
+    });
     count(uint64_t(image.width) * image.height);
 }
 
