@@ -10,6 +10,7 @@ const HEADER_BYTES = 28;
 const REPLY_BYTES = 16;
 const PAYLOAD_LIMIT = 1 << 20;
 const TYPES = ['control', 'bulk', 'cancel'];
+const HANDOVER_MS = 200;
 
 export class UsbSocket {
   #server;
@@ -65,17 +66,25 @@ export class UsbSocket {
   }
 
   #accept(socket) {
+    socket.on('error', () => {}); // 'close' follows
     if (this.#client !== null) {
-      this.#log('usb: a second client was turned away');
-      socket.destroy();
+      // A client that reconnects may be seen before its old connection's end is.
+      this.#client.once('close', () => {
+        clearTimeout(turnAway);
+        this.#accept(socket);
+      });
+      const turnAway = setTimeout(() => {
+        this.#log('usb: a second client was turned away');
+        socket.destroy();
+      }, HANDOVER_MS);
       return;
     }
+    if (socket.destroyed) return;
     this.#client = socket;
     this.#onClient(true);
     socket.on('data', (bytes) => {
       if (socket === this.#client) this.#receive(bytes);
     });
-    socket.on('error', () => {}); // 'close' follows
     socket.on('close', () => {
       if (socket !== this.#client) return;
       this.#forget();
