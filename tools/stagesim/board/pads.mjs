@@ -71,10 +71,11 @@ export class Pads {
     return (synchronised & ~bypass) | (this.#inputsAt(cycle) & bypass);
   }
 
-  /** True if the synchroniser holds no change of `gpio` that is yet to be seen in `cycle`. */
+  /** True if the synchroniser holds no change of `gpio` that is yet to be seen after `cycle`. */
   settled(gpio, cycle) {
-    const change = this.#history[0].inputs ^ this.#inputsAt(cycle - SYNCHRONISER_CYCLES);
-    return ((change >> gpio) & 1) === 0;
+    const seen = this.#inputsAt(cycle - SYNCHRONISER_CYCLES);
+    return this.#history.every(({ from, inputs }) =>
+      from <= cycle - SYNCHRONISER_CYCLES || (((inputs ^ seen) >> gpio) & 1) === 0);
   }
 
   #inputsAt(cycle) {
