@@ -20,16 +20,19 @@ export class UsbSocket {
   #inFlight = new Map(); // tag -> handle of the host
   #host;
   #log;
+  #onClient;
 
   /**
    * @param {() => import('./usb_host.mjs').UsbHost} host the chip's at this moment
    * @param {() => void} onActivity called when something has come in
+   * @param {(connected: boolean) => void} onClient called when a client has come or gone
    */
-  constructor(path, host, onActivity, log) {
+  constructor(path, host, onActivity, log, onClient = () => {}) {
     this.#path = path;
     this.#host = host;
     this.#log = log;
     this.onActivity = onActivity;
+    this.#onClient = onClient;
     this.#server = createServer((socket) => this.#accept(socket));
   }
 
@@ -78,6 +81,7 @@ export class UsbSocket {
     }
     if (socket.destroyed) return;
     this.#client = socket;
+    this.#onClient(true);
     socket.on('data', (bytes) => {
       if (socket === this.#client) this.#receive(bytes);
     });
@@ -92,6 +96,7 @@ export class UsbSocket {
   }
 
   #forget() {
+    if (this.#client !== null) this.#onClient(false);
     this.#client = null;
     this.#input = Buffer.alloc(0);
     this.#inFlight.clear();
