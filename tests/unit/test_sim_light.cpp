@@ -147,10 +147,11 @@ TEST(SimLight, the_specular_lobe_reflects_what_its_facets_do_not_send_below_the_
         constexpr int rings = 600, sectors = 600;
         for (int i = 0; i < rings; ++i)
             for (int j = 0; j < sectors; ++j) {
-                const double z = (i + 0.5) / rings, s = std::sqrt(1 - z * z),
-                             phi = 2 * std::numbers::pi * (j + 0.5) / sectors;
+                // Rings crowd towards the normal, where a smooth surface's lobe is narrow.
+                const double u = (i + 0.5) / rings, z = 1 - u * u, s = std::sqrt(1 - z * z);
+                const double phi = 2 * std::numbers::pi * (j + 0.5) / sectors;
                 const Vec3 light{s * std::cos(phi), s * std::sin(phi), z}, half = normalized(light + view);
-                sum += ggx(float(half.z), float(z), float(view.z), float(dot(half, view)), alpha, 1) * z;
+                sum += ggx(float(half.z), float(z), float(view.z), float(dot(half, view)), alpha, 1) * z * 2 * u;
             }
         return sum * 2 * std::numbers::pi / (double(rings) * sectors);
     };
