@@ -4,7 +4,7 @@ single-lamp pictures.
 
 Lamps stand for a map as far as 156 directions can. What they cannot resolve is measured apart: Mitsuba also renders the map
 after each lamp's cell was given its mean radiance. Skipped where mitsuba is not installed
-(`.venv/bin/pip install mitsuba`)."""
+(`.venv/bin/pip install mitsuba`); the head comes from `make assets` or the folder OLS_ASSETS."""
 import json
 import os
 from pathlib import Path
