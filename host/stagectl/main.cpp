@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+// stagectl: the light stage's control program.
+#include "stagectl/verbs.hpp"
+
+int main(int argc, char** argv) {
+    CLI::App app{"Controls a light stage: sequences, takes, calibration, and photographs from elsewhere."};
+    app.name("stagectl");
+    app.footer("Exit codes: 0 done; 1 an error, named; else wrong arguments.");
+    app.require_subcommand(1);
+    int exit_code = 0;
+    ols::add_ingest_verb(app, exit_code);
+    CLI11_PARSE(app, argc, argv);
+    return exit_code;
+}
