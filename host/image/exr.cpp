@@ -7,6 +7,7 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <half.h>
 #include <unistd.h>
@@ -58,6 +59,15 @@ Result<Image> read_exr(const std::string& path) {
         file.setFrameBuffer(buffer);
         file.readPixels(window.min.y, window.max.y);
         return image;
+    } catch (const std::exception& e) {
+        return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
+    }
+}
+
+Result<bool> is_exr_cube_map(const std::string& path) {
+    try {
+        const Imf::InputFile file(path.c_str());
+        return Imf::hasEnvmap(file.header()) && Imf::envmap(file.header()) == Imf::ENVMAP_CUBE;
     } catch (const std::exception& e) {
         return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
     }

@@ -18,6 +18,9 @@ enum class ExrType { half_float, single_float };
 // are the caller's to judge.
 Result<Image> read_exr(const std::string& path);
 
+// Whether a file's `envmap` attribute says that it is a cube map. False without the attribute.
+Result<bool> is_exr_cube_map(const std::string& path);
+
 // Writes 1 (Y), 3 (R G B) or 4 (R G B A, premultiplied) channels, ZIP compressed, scene-linear, to a temporary
 // name and renames it, so that no half-written file stays. `attributes` are string attributes of the header.
 Status write_exr(const std::string& path, const Image& image, ExrType type = ExrType::half_float,
