@@ -24,8 +24,8 @@ struct LampLight {
 
 struct Flicker {
     std::vector<LampLight> lamps;
-    FlickerPeak whole;             // of all lamps together
-    FlickerPeak worst_lamp;        // of the one lamp that flickers most
+    FlickerPeak whole;       // of all lamps together
+    FlickerPeak worst_lamp;  // of the one lamp that flickers most
     int worst_lamp_index = -1;
     double light_duty = 0;  // share of time that any lamp is lit
 };

@@ -115,10 +115,10 @@ Status check_exposures(const SequenceConfig& config) {
                                                         {"matte", config.matte_exposure_us}};
     for (const auto& [name, exposure_us] : exposures)
         if (ticks_of_us(exposure_us) >= period_ticks)
-            return fail(fmt::format("the {} exposure of {} us does not fit the {:.1f} us between frames at {} frames "
-                                    "a second: shorten it or lower frame_rate_hz",
-                                    name, exposure_us, double(period_ticks) / double(ticks_per_us),
-                                    config.frame_rate_hz));
+            return fail(
+                fmt::format("the {} exposure of {} us does not fit the {:.1f} us between frames at {} frames "
+                            "a second: shorten it or lower frame_rate_hz",
+                            name, exposure_us, double(period_ticks) / double(ticks_per_us), config.frame_rate_hz));
     return Done{};
 }
 
@@ -173,14 +173,16 @@ Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfi
     Sequence sequence{config, std::move(*basis), {}};
     sequence.slots = CycleLayout(config, stage, sequence.basis).lay_out();
     if (sequence.slots.size() > OLS_SLOTS_MAX)
-        return fail(fmt::format("the cycle has {} slots and the board plays {}: choose longer groups or a basis of "
-                                "fewer rows",
-                                sequence.slots.size(), OLS_SLOTS_MAX));
+        return fail(
+            fmt::format("the cycle has {} slots and the board plays {}: choose longer groups or a basis of "
+                        "fewer rows",
+                        sequence.slots.size(), OLS_SLOTS_MAX));
     std::vector<SlotKind> kinds;
     for (const Slot& slot : sequence.slots) kinds.push_back(slot.kind);
     if (!has_unique_order(kinds))
-        return fail("the order of tracking, matte and dark slots repeats within the cycle, so that a frame's slot "
-                    "could not be proved: choose another group_slots");
+        return fail(
+            "the order of tracking, matte and dark slots repeats within the cycle, so that a frame's slot "
+            "could not be proved: choose another group_slots");
     return sequence;
 }
 
