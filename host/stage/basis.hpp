@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "result.hpp"
+#include "stage/lamps.hpp"
 
 namespace ols {
 
@@ -22,6 +23,9 @@ struct Basis {
     bool lit(int row, int lamp) const { return on[size_t(row) * lamps + lamp] != 0; }
     int weight(int row, int lamp) const { return weights[size_t(row) * lamps + lamp]; }
 };
+
+// Variance of a recovered lamp when every row image has independent noise of variance 1 (a single lamp a row: 1).
+double noise_variance(const Basis& basis, int lamp);
 
 // The names that find_basis knows, for help texts.
 std::vector<std::string> basis_names();
