@@ -2,14 +2,18 @@
 // Archives of reflectance functions (`take.rfa/`): what is in one, how it is written so that a crash loses nothing that
 // was finished, and how it is read.
 //
-//   take.rfa/manifest.json          what the take is; rewritten by rename
-//   take.rfa/journal.jsonl          one fsynced line an event: begin, target (file, bytes, checksum), missing target,
-//   end take.rfa/lights.lp              the lamps' names (lamp_000 ...) and directions take.rfa/cam0/target_000000.exr
-//   tiled, scene-linear: part "lamps" (layers lamp_000.Y ..., or lamp_000.R/G/B), part "mask", part
-//                                   "variance"
+//   take.rfa/manifest.json             what the take is, its lamps, and what else is known; rewritten by rename
+//   take.rfa/journal.jsonl             one fsynced line an event: begin, target (file, bytes, CRC-32), missing, end
+//   take.rfa/lights.lp                 the lamps as lamp_000 ... and their directions, for other programs
+//   take.rfa/cam0/target_000000.exr    tiled, scene-linear, three parts: "lamps" (layers lamp_000.Y, or .R .G .B),
+//                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known)
+//
+// A target counts only when its journal line is complete and its file agrees with it. A target's file gets its name
+// after its bytes are on the disk, and its journal line after that.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -26,6 +30,7 @@ enum MaskBit : uint32_t {
     mask_saturated = 1,  // a sample that this lamp value rests on was at or above white
     mask_missing = 2,    // a slot was missing
     mask_outside = 4,    // outside the user's mask (ingest)
+    mask_clamped = 8,    // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
 };
 
 // One output frame of one camera: all OLAT values. Planes are row-major, top to bottom.
@@ -33,43 +38,64 @@ struct Target {
     uint32_t camera = 0, index = 0;
     int width = 0, height = 0;
     Cfa cfa = Cfa::none;  // a mosaic stays a mosaic; Cfa::rgb has three planes a lamp
-    std::vector<std::vector<float>>
-        lamps;                    // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
-    std::vector<uint32_t> mask;   // [y * width + x], MaskBit
-    std::vector<float> variance;  // [y * width + x] of one lamp value, mean over lamps; empty if not known
-    nlohmann::json provenance;    // cycle, tick, timecode, slots used: goes to the header and the journal
+    // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
+    std::vector<std::vector<float>> lamps;
+    std::vector<uint32_t> mask;      // [y * width + x], MaskBit
+    std::vector<float> variance;     // [y * width + x] of one lamp value, mean over lamps; empty if not known
+    std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
+    nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
 
     int planes() const { return cfa == Cfa::rgb ? 3 : 1; }
 };
 
 enum class SampleType { half_float, single_float };
+enum class Compression { none, zips };  // of the lamps part; zips is lossless, smaller and slower to read
 
 // What a manifest begins with; `extra` holds what only some takes have (identification, calibration, program).
 struct TakeInfo {
     std::string production, scene, take, notes;  // slate
-    std::string timecode_start;                  // SMPTE "HH:MM:SS:FF", of target 0
+    std::string timecode_start;                  // SMPTE "HH:MM:SS:FF" of target 0, non-drop; "" if not known
     double frame_rate_hz = 24;                   // of targets
     std::string basis;                           // "" for ingested photographs
     std::string value_unit;                      // "reflectance" (white = 1) or "pixel" (full scale = 1)
     std::vector<LightPosition> lights;
     SampleType sample_type = SampleType::half_float;
-    nlohmann::json extra;
+    Compression compression = Compression::none;
+    std::string color_interop_id = "unknown";  // of lamp values; camera mosaics have no standard name
+    nlohmann::json extra = nlohmann::json::object();
 };
+
+// A rectangle of pixels.
+struct Box {
+    int x = 0, y = 0, width = 0, height = 0;
+};
+
+// Fills out[(y - box.y) * box.width + x - box.x] with samples of a plane (lamp * planes + colour).
+using PlaneSource = std::function<Status(int plane, const Box& box, float* out)>;
+
+// "lamp_000": the layer of a lamp in an archive of `count` lamps; more digits beyond a thousand, so that names sort.
+std::string lamp_layer(int lamp, int count);
 
 class ArchiveWriter {
   public:
-    // Makes the directory and its journal. Refuses one that exists, naming it, unless `overwrite` (which removes only
-    // something that is an archive).
+    // Makes the directory with its manifest, lights and journal, or leaves nothing. A path that exists is refused by
+    // name; `overwrite` removes it first, but only files that an archive consists of: a stranger among them is an
+    // error.
     static Result<ArchiveWriter> create(const std::string& path, const TakeInfo& info, bool overwrite = false);
 
-    // Writes a target to a temporary name, fsyncs, renames, then journals it; safe to call from one thread at a time.
+    // Writes a target to a temporary name, fsyncs, renames, then journals it; for one thread at a time. After an error
+    // (a full disk, say) neither file nor journal line stays, what was written before is untouched, and the writer may
+    // be used on. Values that the sample type cannot hold are clamped and masked (mask_clamped), never Inf or NaN.
     Status write_target(const Target& target);
+
+    // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.
+    Status write_target(const Target& head, const PlaneSource& source);
 
     // Journals a target that could not be made, and why.
     Status note_missing_target(uint32_t camera, uint32_t index, const std::string& why,
                                const nlohmann::json& detail = {});
 
-    // Adds to the manifest's `extra` (merged by key).
+    // Adds to the manifest's `extra` (merged by key, RFC 7396); on the disk after finish().
     void add_to_manifest(const nlohmann::json& extra);
 
     // Completes the manifest and journals the end; an archive without it reads as unfinished.
@@ -86,12 +112,22 @@ class ArchiveWriter {
 
 struct TargetEntry {
     uint32_t camera = 0, index = 0;
-    std::string file;  // relative to the archive; empty for a missing target
-    std::string why_missing;
+    std::string file;         // relative to the archive; empty for a missing target
+    std::string why_missing;  // empty for a finished one
+    nlohmann::json detail;    // provenance of a finished target, detail of a missing one
+    uint64_t bytes = 0;
+    uint32_t crc32 = 0;
+};
+
+// What verify found: finished targets whose files are as the journal says, and one line for everything else.
+struct Verification {
+    std::vector<std::string> intact;    // files, relative to the archive
+    std::vector<std::string> problems;  // each names its file: damaged, never finished, left over
 };
 
 class ArchiveReader {
   public:
+    // Opens finished and unfinished archives alike: a torn last journal line and leftovers are verify's to tell.
     static Result<ArchiveReader> open(const std::string& path);
 
     const TakeInfo& info() const;
@@ -99,12 +135,17 @@ class ArchiveReader {
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
     bool finished() const;                            // the journal has its end
 
-    // Reads one finished target with all its lamps.
+    // Everything of a target but its samples: size, colour filter, missing lamps, provenance.
+    Result<Target> read_head(uint32_t camera, uint32_t index) const;
+
+    // Reads one finished target with all its lamps: width * height * lamps * planes * 4 bytes.
     Result<Target> read_target(uint32_t camera, uint32_t index) const;
 
-    // Checks every file against the journal's size and checksum and opens it; problems are one line each and name the
-    // file.
-    std::vector<std::string> verify() const;
+    // A part of a target, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels.
+    Result<Target> read_box(uint32_t camera, uint32_t index, const Box& box) const;
+
+    // Compares every file with the journal's size and checksum and opens it.
+    Verification verify() const;
 
     ArchiveReader(ArchiveReader&&) noexcept;
     ~ArchiveReader();

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+// Link: frames from the transport, commands to the stage, replies back. A reply is built where it is sent from, and the
+// next request waits for that place.
+#include "link.h"
+
+#include <string.h>
+
+#include "board.h"
+#include "frame.h"
+#include "layout_hash.h"
+#include "stage.h"
+#include "text.h"
+#include "transport.h"
+#include "trigger_log.h"
+
+static struct ols_frame_parser parser;
+static uint32_t session;
+static uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
+
+// A reply being made; without `ok` it is the error.
+struct reply {
+    bool ok;
+    size_t payload_bytes;
+    union {
+        struct ols_hello_reply hello;
+        struct ols_status_reply status;
+        struct {
+            struct ols_trigger_log_reply header;
+            struct ols_trigger_log_entry entries[OLS_LOG_ENTRIES_MAX];
+        } __attribute__((packed)) log;
+        struct ols_error_reply error;
+    } payload;
+};
+
+static void answer_hello(const struct ols_frame* request, struct reply* reply) {
+    (void)request;  // its hash is for boards that could speak more than one layout
+    struct ols_hello_reply* const hello = &reply->payload.hello;
+    *hello = (struct ols_hello_reply){.layout_hash = OLS_LAYOUT_HASH,
+                                      .firmware_version = BOARD_FIRMWARE_VERSION,
+                                      .boot_nonce = board_boot_nonce(),
+                                      .tick_hz = BOARD_TICK_HZ,
+                                      .chain_bits = BOARD_CHAIN_BITS,
+                                      .slots_max = OLS_SLOTS_MAX,
+                                      .shift_ticks = sequence_shift_ticks(&board_sequence),
+                                      .slot_gap_ticks = sequence_slot_gap_ticks()};
+    board_read_id(hello->board_id);
+    reply->payload_bytes = sizeof *hello;
+}
+
+static void answer_load_begin(const struct ols_frame* request, struct reply* reply) {
+    struct ols_load_begin begin;
+    memcpy(&begin, request->payload, sizeof begin);
+    reply->ok = stage_load_begin(&begin, &reply->payload.error);
+}
+
+static void answer_load_chunk(const struct ols_frame* request, struct reply* reply) {
+    struct ols_load_chunk chunk;
+    memcpy(&chunk, request->payload, sizeof chunk);
+    reply->ok = stage_load_chunk(chunk.offset_bytes, request->payload + sizeof chunk,
+                                 request->payload_bytes - sizeof chunk, &reply->payload.error);
+}
+
+static void answer_load_end(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_load_end(&reply->payload.error);
+}
+
+static void answer_arm(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_arm(&reply->payload.error);
+}
+
+static void answer_start(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_start(&reply->payload.error);
+}
+
+static void answer_stop(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_stop(&reply->payload.error);
+}
+
+static void answer_status(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    stage_status(&reply->payload.status);
+    reply->payload_bytes = sizeof reply->payload.status;
+}
+
+static void answer_read_trigger_log(const struct ols_frame* request, struct reply* reply) {
+    struct ols_read_trigger_log read;
+    memcpy(&read, request->payload, sizeof read);
+    const uint16_t entries_max = read.entries_max < OLS_LOG_ENTRIES_MAX ? read.entries_max : OLS_LOG_ENTRIES_MAX;
+    trigger_log_read(read.first_counter, entries_max, &reply->payload.log.header, reply->payload.log.entries);
+    reply->payload_bytes =
+        sizeof reply->payload.log.header + reply->payload.log.header.entry_count * sizeof *reply->payload.log.entries;
+}
+
+static void answer_clear_fault(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_clear_fault(&reply->payload.error);
+}
+
+static const struct command {
+    uint16_t type;
+    uint16_t payload_bytes_min, payload_bytes_max;
+    void (*answer)(const struct ols_frame* request, struct reply* reply);
+} commands[] = {
+    {OLS_HELLO, sizeof(struct ols_hello), OLS_PAYLOAD_BYTES_MAX, answer_hello},  // longer: a later version's
+    {OLS_LOAD_BEGIN, sizeof(struct ols_load_begin), sizeof(struct ols_load_begin), answer_load_begin},
+    {OLS_LOAD_CHUNK, sizeof(struct ols_load_chunk), OLS_PAYLOAD_BYTES_MAX, answer_load_chunk},
+    {OLS_LOAD_END, 0, 0, answer_load_end},
+    {OLS_ARM, 0, 0, answer_arm},
+    {OLS_START, 0, 0, answer_start},
+    {OLS_STOP, 0, 0, answer_stop},
+    {OLS_STATUS, 0, 0, answer_status},
+    {OLS_READ_TRIGGER_LOG, sizeof(struct ols_read_trigger_log), sizeof(struct ols_read_trigger_log),
+     answer_read_trigger_log},
+    {OLS_CLEAR_FAULT, 0, 0, answer_clear_fault},
+};
+
+static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
+    reply->ok = false;
+    reply->payload.error = (struct ols_error_reply){.code = (uint16_t)code, .slot = OLS_NO_SLOT};
+    struct text text = text_in(reply->payload.error.text, sizeof reply->payload.error.text);
+    text_append(&text, reason);
+}
+
+static void answer(const struct ols_frame* request, struct reply* reply) {
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        const struct command* const command = &commands[i];
+        if (command->type != request->type) continue;
+        if (request->payload_bytes < command->payload_bytes_min || request->payload_bytes > command->payload_bytes_max)
+            return refuse(reply, OLS_ERROR_BAD_LENGTH, "the message's length is wrong: host and board do not match");
+        return command->answer(request, reply);
+    }
+    refuse(reply, OLS_ERROR_UNKNOWN_MESSAGE, "unknown message: update the firmware with `make flash`");
+}
+
+static void handle(const struct ols_frame* request) {
+    static struct reply reply;  // too big for the stack of 8 KB to be careless with
+    memset(&reply, 0, sizeof reply);
+    reply.ok = true;
+    answer(request, &reply);
+    const uint16_t type = (reply.ok ? request->type : OLS_ERROR) | OLS_REPLY;
+    const size_t payload_bytes = reply.ok ? reply.payload_bytes : sizeof reply.payload.error;
+    transport_send(reply_frame, ols_frame_encode(type, request->request_id, &reply.payload, payload_bytes, reply_frame,
+                                                 sizeof reply_frame));
+}
+
+void link_poll(void) {
+    if (session != transport_session()) {
+        session = transport_session();
+        memset(&parser, 0, sizeof parser);
+    }
+    static uint8_t packet[TRANSPORT_PACKET_BYTES];
+    static size_t packet_bytes, packet_used;
+    while (transport_can_send()) {
+        struct ols_frame request;
+        if (ols_frame_parser_read(&parser, &request)) {
+            handle(&request);
+            continue;
+        }
+        if (packet_used == packet_bytes) {
+            packet_used = 0;
+            packet_bytes = transport_receive(packet);
+            if (packet_bytes == 0) return;
+        }
+        packet_used += ols_frame_parser_write(&parser, packet + packet_used, packet_bytes - packet_used);
+    }
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// The firmware's one loop. Light and triggers do not wait for it: PIO plays them (pulse.pio), and stops dark by itself.
+#include "board.h"
+#include "fault.h"
+#include "link.h"
+#include "player.h"
+#include "stage.h"
+#include "transport.h"
+#include "usb.h"
+#include "witness.h"
+
+int main(void) {
+    board_init();
+    player_init();
+    witness_init();
+    fault_init();
+    stage_init();
+    usb_init();
+    for (;;) {
+        board_feed_watchdog();
+        usb_poll();
+        stage_poll(transport_is_attached());
+        link_poll();
+        board_sleep();
+    }
+}

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// Player: plays a compiled sequence with PIO and DMA. Once started, nothing depends on the processor; player and
+// witness (witness.h) only say what happened.
+#ifndef OLS_PLAYER_H
+#define OLS_PLAYER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sequence.h"
+
+// PIO flags, as in pulse.pio.
+enum player_event { PLAYER_TIMELINE_STARVED = 1 << 0, PLAYER_DONE = 1 << 1, PLAYER_SHIFTER_STARVED = 1 << 2 };
+
+// Loads the PIO programs. Once, after board_init.
+void player_init(void);
+
+// Fills the FIFOs, connects the pins and sends the first pattern. `sequence` must stay as it is until player_stop.
+// False, with the pins dark, when the chain could not be filled.
+bool player_arm(const struct sequence* sequence);
+
+// Starts the timeline: the first event plays within a few ticks.
+void player_start(void);
+
+// What happened since the last call, enum player_event bits.
+uint32_t player_take_events(void);
+
+// Dark, machines and DMA stopped. In any state.
+void player_stop(void);
+
+#endif

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// Stage: the board's state (wire.h, ols_state) and what each command does in it.
+#ifndef OLS_STAGE_H
+#define OLS_STAGE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "wire.h"
+
+// Idle, or fault when the previous run ended in one.
+void stage_init(void);
+
+// Once each turn of the main loop: follows what player and witness saw. `host_is_there` says whether anybody could stop
+// the light.
+void stage_poll(bool host_is_there);
+
+// Commands. False with `error` filled in when refused; nothing has changed then, except that a program whose loading
+// failed is gone.
+bool stage_load_begin(const struct ols_load_begin* header, struct ols_error_reply* error);
+bool stage_load_chunk(uint32_t offset_bytes, const uint8_t* data, size_t data_bytes, struct ols_error_reply* error);
+bool stage_load_end(struct ols_error_reply* error);
+bool stage_arm(struct ols_error_reply* error);
+bool stage_start(struct ols_error_reply* error);
+bool stage_stop(struct ols_error_reply* error);
+bool stage_clear_fault(struct ols_error_reply* error);
+
+void stage_status(struct ols_status_reply* status);
+
+#endif

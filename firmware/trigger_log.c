@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+// Trigger log: a ring of the last triggers. Slot and scheduled time follow from walking the sequence along with them.
+#include "trigger_log.h"
+
+#include <string.h>
+
+#include "pulse.h"
+
+enum {
+    LOG_ENTRIES = 2048,
+    // Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser.
+    TOLERANCE_TICKS = 3,
+    WATCHED_TRIGGER = 1 << 0  // TRIG0
+};
+
+static struct ols_trigger_log_entry entries[LOG_ENTRIES];
+static const struct sequence* played;
+static uint32_t oldest;   // counter of the first entry kept
+static uint32_t fired;    // counter that the next trigger gets
+static uint32_t read_to;  // counter after the last entry the host has read
+static uint32_t lost;
+static uint32_t next_slot;        // where the search for the next trigger's slot begins
+static uint32_t cycle;            // of next_slot
+static uint64_t scheduled_ticks;  // rise of next_slot since the rise of slot 0 of cycle 0
+static struct ols_trigger_log_entry last;
+static int64_t first_error_ticks;  // measured minus scheduled of the first trigger: where start is on the schedule
+
+void trigger_log_begin(const struct sequence* sequence) {
+    played = sequence;
+    oldest = fired = read_to = lost = next_slot = cycle = 0;
+    scheduled_ticks = 0;
+    last = (struct ols_trigger_log_entry){.slot = OLS_NO_SLOT};
+}
+
+static void step_slot(void) {
+    scheduled_ticks += played->slots[next_slot].period_ticks;
+    if (++next_slot < played->slot_count) return;
+    next_slot = 0;
+    cycle++;
+}
+
+// Makes next_slot the next slot that fires the watched trigger; false when none of the cycle does.
+static bool find_slot(void) {
+    for (uint32_t tried = 0; tried < played->slot_count; tried++) {
+        if (played->slots[next_slot].trigger_mask & WATCHED_TRIGGER) return true;
+        step_slot();
+    }
+    return false;
+}
+
+// The stamp counts down once every WITNESS_COUNT_TICKS and wraps within about a minute; the upper bits are those that
+// bring it next to now_ticks.
+static uint64_t rise_from_stamp(uint32_t stamp, uint64_t now_ticks) {
+    const uint64_t now_counts = now_ticks / WITNESS_COUNT_TICKS;
+    const int32_t since = (int32_t)((uint32_t)now_counts - ~stamp);
+    const int64_t counts = (int64_t)now_counts - since;
+    return counts < 0 ? 0 : (uint64_t)counts * WITNESS_COUNT_TICKS;
+}
+
+bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
+    if (!find_slot()) return false;
+    if (fired - oldest == LOG_ENTRIES && oldest++ >= read_to) lost++;
+    last = (struct ols_trigger_log_entry){.rise_ticks = rise_from_stamp(stamp, now_ticks),
+                                          .counter = fired,
+                                          .cycle = cycle,
+                                          .slot = (uint16_t)next_slot,
+                                          .trigger_mask = (uint16_t)played->slots[next_slot].trigger_mask};
+    entries[fired % LOG_ENTRIES] = last;
+    const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks;
+    if (fired == 0) first_error_ticks = error_ticks;
+    fired++;
+    step_slot();
+    const int64_t slip_ticks = error_ticks - first_error_ticks;
+    return slip_ticks <= TOLERANCE_TICKS && slip_ticks >= -TOLERANCE_TICKS;
+}
+
+void trigger_log_skip(uint32_t count) {
+    const uint32_t unread_from = read_to > oldest ? read_to : oldest;
+    lost += fired - unread_from + count;
+    for (; count > 0 && find_slot(); count--) {
+        step_slot();
+        fired++;
+    }
+    oldest = fired;  // the entries kept are without gaps
+}
+
+void trigger_log_read(uint32_t first, uint16_t entries_max, struct ols_trigger_log_reply* header,
+                      struct ols_trigger_log_entry* out) {
+    if (first < oldest) first = oldest;
+    if (first > fired) first = fired;
+    uint32_t count = fired - first;
+    if (count > entries_max) count = entries_max;
+    for (uint32_t i = 0; i < count; i++) out[i] = entries[(first + i) % LOG_ENTRIES];
+    if (first + count > read_to) read_to = first + count;
+    *header = (struct ols_trigger_log_reply){
+        .first_counter = first, .next_counter = fired, .entries_lost = lost, .entry_count = (uint16_t)count};
+}
+
+uint32_t trigger_log_fired(void) {
+    return fired;
+}
+
+uint32_t trigger_log_lost(void) {
+    return lost;
+}
+
+uint16_t trigger_log_slot(void) {
+    return last.slot;
+}
+
+uint32_t trigger_log_cycle(void) {
+    return last.cycle;
+}

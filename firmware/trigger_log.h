@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Trigger log: which slot each measured trigger belongs to, and whether it came when it should.
+#ifndef OLS_TRIGGER_LOG_H
+#define OLS_TRIGGER_LOG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sequence.h"
+
+// Empties the log for a new start of `sequence`, which must stay as it is while triggers are added.
+void trigger_log_begin(const struct sequence* sequence);
+
+// Adds the next trigger. `stamp` is the witness's; `now_ticks` (since start, good to half a minute) tells how often the
+// stamp has wrapped. False when the trigger is not at its scheduled distance from the first one.
+bool trigger_log_add(uint32_t stamp, uint64_t now_ticks);
+
+// Notes that `count` triggers fired whose stamps were overwritten before they were read.
+void trigger_log_skip(uint32_t count);
+
+// Copies up to `entries_max` entries from counter `first` on (or the oldest still kept) and fills in the header.
+void trigger_log_read(uint32_t first, uint16_t entries_max, struct ols_trigger_log_reply* header,
+                      struct ols_trigger_log_entry* entries);
+
+// So far.
+uint32_t trigger_log_fired(void);
+uint32_t trigger_log_lost(void);
+// Of the last trigger; slot OLS_NO_SLOT before the first.
+uint16_t trigger_log_slot(void);
+uint32_t trigger_log_cycle(void);
+
+#endif

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// Witness: measures the trigger times at the pin. Stamps count down from 2^32 - 1, one every second tick since start.
+#ifndef OLS_WITNESS_H
+#define OLS_WITNESS_H
+
+#include <stdint.h>
+
+enum { WITNESS_RING_STAMPS = 1024 };
+
+void witness_init(void);
+void witness_arm(void);
+void witness_start(void);
+
+// Rising edges of TRIG0 seen since start.
+uint32_t witness_count(void);
+
+// The stamp of edge n, one of the last WITNESS_RING_STAMPS.
+uint32_t witness_stamp(uint32_t n);
+
+#endif

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// PNG files of 8-bit sRGB pixels, for looking at.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "image/frame.hpp"
+#include "result.hpp"
+
+namespace ols {
+
+// Writes interleaved R G B, rows top to bottom, to a temporary name and renames it, so that no half-written file stays.
+Status write_png(const std::string& path, int width, int height, std::span<const uint8_t> rgb8);
+
+// Writes a scene-linear image through tone_mapped_rgb8 (image/tone.hpp).
+Status write_png_preview(const std::string& path, const Image& scene_linear);
+
+}  // namespace ols

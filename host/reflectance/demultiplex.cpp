@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+// The plain exact inversion: a small integer matrix product, tiled so that a tile of all rows stays in the second-level
+// cache (159 rows x 256 samples x 4 bytes = 163 KB) while every lamp is summed from it.
+#include "reflectance/demultiplex.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <cmath>
+#include <thread>
+#include <vector>
+
+namespace ols {
+
+namespace {
+
+constexpr size_t tile_samples = 256;
+constexpr int lamps_at_once = 4;  // share each load of a row
+
+// The type that row samples are summed in, and a vector of those: one AVX2 register, two of SSE2. Tiles are aligned for
+// their elements only.
+template <typename Sample>
+struct Arithmetic;
+template <>
+struct Arithmetic<int32_t> {
+    using Sum = int32_t;
+    typedef int32_t Vector __attribute__((vector_size(32), aligned(4), may_alias));
+};
+template <>
+struct Arithmetic<float> {
+    using Sum = double;
+    typedef double Vector __attribute__((vector_size(32), aligned(8), may_alias));
+};
+template <typename Sample>
+using SumOf = typename Arithmetic<Sample>::Sum;
+
+// sums[lamp][p] of four lamps over one tile[row * tile_samples + p]; weights[row * lamps_at_once + lamp].
+template <typename Sample>
+__attribute__((always_inline)) inline void sum_tile(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
+                                                    SumOf<Sample> (*sums)[tile_samples]) {
+    using Vector = typename Arithmetic<Sample>::Vector;
+    for (size_t p = 0; p < tile_samples; p += sizeof(Vector) / sizeof(SumOf<Sample>)) {
+        // Four names instead of an array: the compiler keeps these in registers.
+        Vector sum0{}, sum1{}, sum2{}, sum3{};
+        for (int r = 0; r < rows; ++r) {
+            const Vector y = *reinterpret_cast<const Vector*>(tile + size_t(r) * tile_samples + p);
+            const auto* w = weights + size_t(r) * lamps_at_once;
+            sum0 += y * w[0], sum1 += y * w[1], sum2 += y * w[2], sum3 += y * w[3];
+        }
+        *reinterpret_cast<Vector*>(sums[0] + p) = sum0;
+        *reinterpret_cast<Vector*>(sums[1] + p) = sum1;
+        *reinterpret_cast<Vector*>(sums[2] + p) = sum2;
+        *reinterpret_cast<Vector*>(sums[3] + p) = sum3;
+    }
+}
+
+template <typename Sample>
+void sum_tile_portable(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
+                       SumOf<Sample> (*sums)[tile_samples]) {
+    sum_tile<Sample>(tile, rows, weights, sums);
+}
+
+#if defined(__x86_64__)
+template <typename Sample>
+__attribute__((target("avx2"))) void sum_tile_avx2(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
+                                                   SumOf<Sample> (*sums)[tile_samples]) {
+    sum_tile<Sample>(tile, rows, weights, sums);
+}
+#endif
+
+// Chosen at run time: shipped binaries are built for the baseline processor. Integer sums agree by nature; double sums
+// agree because each lane adds its rows in the same order and products are not fused.
+template <typename Sample>
+auto best_sum_tile() {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) return sum_tile_avx2<Sample>;
+#endif
+    return sum_tile_portable<Sample>;
+}
+
+// Weights as the kernel reads them: [group of four lamps][row][lamp in group], zero beyond the last lamp.
+template <typename Sum>
+std::vector<Sum> grouped_weights(const Basis& basis) {
+    const int groups = (basis.lamps + lamps_at_once - 1) / lamps_at_once;
+    std::vector<Sum> weights(size_t(groups) * basis.rows * lamps_at_once);
+    for (int r = 0; r < basis.rows; ++r)
+        for (int i = 0; i < basis.lamps; ++i)
+            weights[(size_t(i / lamps_at_once) * basis.rows + r) * lamps_at_once + i % lamps_at_once] =
+                Sum(basis.weight(r, i));
+    return weights;
+}
+
+// Runs `threads` workers, each calling its own work(begin, count) for tiles it takes from a shared counter. Tiles are
+// independent, so who takes which does not matter.
+template <typename MakeWorker>
+void for_each_tile(size_t samples, int threads, const MakeWorker& make_worker) {
+    std::atomic<size_t> next{0};
+    const auto run = [&] {
+        auto work = make_worker();
+        for (size_t begin; (begin = next.fetch_add(tile_samples)) < samples;)
+            work(begin, std::min(tile_samples, samples - begin));
+    };
+    if (threads <= 0) threads = std::max(1, int(std::thread::hardware_concurrency()));
+    std::vector<std::jthread> others;
+    for (int t = 1; t < threads; ++t) others.emplace_back(run);
+    run();
+}
+
+template <typename Sample>
+void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
+                         std::span<float* const> lamps, const DemultiplexOptions& options) {
+    using Sum = SumOf<Sample>;
+    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.lamps);
+    assert(options.gain.empty() || options.gain.size() == samples);
+    const auto weights = grouped_weights<Sum>(basis);
+    const auto kernel = best_sum_tile<Sample>();
+
+    const auto make_worker = [&] {
+        return [&, tile = std::vector<Sum>(rows.size() * tile_samples)](size_t begin, size_t count) mutable {
+            for (size_t r = 0; r < rows.size(); ++r)
+                std::copy_n(rows[r] + begin, count, tile.data() + r * tile_samples);
+            for (int first = 0; first < basis.lamps; first += lamps_at_once) {
+                Sum sums[lamps_at_once][tile_samples];
+                kernel(tile.data(), basis.rows, weights.data() + size_t(first) * basis.rows, sums);
+                for (int k = 0; k < std::min(lamps_at_once, basis.lamps - first); ++k)
+                    for (size_t p = 0; p < count; ++p) {
+                        const double gain = options.gain.empty() ? 1.0 : options.gain[begin + p];
+                        lamps[first + k][begin + p] = float(double(sums[k][p]) * basis.scale * gain);
+                    }
+            }
+        };
+    };
+    for_each_tile(samples, options.threads, make_worker);
+}
+
+}  // namespace
+
+void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                 std::span<float* const> lamps, const DemultiplexOptions& options) {
+    demultiplex_samples<int32_t>(basis, rows, samples, lamps, options);
+}
+
+void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
+                 const DemultiplexOptions& options) {
+    demultiplex_samples<float>(basis, rows, samples, lamps, options);
+}
+
+void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out) {
+    for (const uint32_t* row : rows)
+        for (size_t p = 0; p < samples; ++p) out[p] |= row[p];
+}
+
+void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                       const NoiseModel& noise, std::span<const float> gain, float* out) {
+    assert(int(rows.size()) == basis.rows && (gain.empty() || gain.size() == samples));
+    std::vector<double> sums(samples);
+    for (int r = 0; r < basis.rows; ++r) {
+        double squares = 0;
+        for (int i = 0; i < basis.lamps; ++i) squares += double(basis.weight(r, i)) * basis.weight(r, i);
+        for (size_t p = 0; p < samples; ++p) {
+            const double sigma = noise.read_counts + noise.shot * std::sqrt(double(std::max(rows[r][p], 0)));
+            sums[p] += squares / basis.lamps * sigma * sigma;
+        }
+    }
+    for (size_t p = 0; p < samples; ++p) {
+        const double factor = basis.scale * (gain.empty() ? 1.0 : gain[p]);
+        out[p] = float(factor * factor * sums[p]);
+    }
+}
+
+}  // namespace ols

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Demultiplexing: from the images of a basis's rows to one image a lamp, with the masks and the variance they carry.
+//
+// Every call works on one sample plane (a mosaic is one plane; interleaved RGB is three calls). Samples are counts above
+// black, signed: black is subtracted and never clamped, or the inversion would be biased.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "stage/basis.hpp"
+#include "stage/stage.hpp"
+
+namespace ols {
+
+struct DemultiplexOptions {
+    // Multiplied into every lamp value of a sample: from counts to r it is 1 / (F t) (docs/architecture.md). Empty: 1.
+    std::span<const float> gain;
+    int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
+};
+
+// lamps[i][p] = basis.scale * gain[p] * sum over rows of weight(row, i) * rows[row][p].
+// `rows` holds basis.rows pointers and `lamps` basis.lamps pointers, each to `samples` values. The sum is exact in int32
+// when |counts| < 2^23: the weights of a lamp sum to at most 232 in magnitude (hadamard156, lamp 0), which suits every
+// camera of up to 16 bits.
+void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                 std::span<float* const> lamps, const DemultiplexOptions& options = {});
+
+// The same for sources that do not quantise: sums in double, rows in order, so that the bits do not depend on the
+// thread count or the SIMD path.
+void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
+                 const DemultiplexOptions& options = {});
+
+// out[p] |= rows[row][p] over all rows: every lamp value of a sample rests on all rows of a multiplexed basis, and a
+// target's mask is one value for all lamps.
+void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out);
+
+// The variance of a lamp value at each sample, mean over lamps, when the noise of row image y is
+// (read + shot sqrt(max(y, 0)))^2 and independent from row to row:
+// out[p] = (scale gain[p])^2 sum over rows of (mean over lamps of weight(row, i)^2) noise(rows[row][p])^2.
+void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                       const NoiseModel& noise, std::span<const float> gain, float* out);
+
+}  // namespace ols

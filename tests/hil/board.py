@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+# The board as the tests see it: an emulated one started as a process, and its messages over the USB cable.
+import json
+import os
+import pathlib
+import select
+import socket
+import subprocess
+import tempfile
+import time
+
+import wire
+from usb import OK, Usb
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+IMAGE = pathlib.Path(os.environ.get("IMAGE", ROOT / "build/firmware/stage.elf"))
+EMULATOR = ROOT / "tools/stagesim/board/board.mjs"
+
+
+class BoardError(Exception):
+    def __init__(self, code, slot, text):
+        super().__init__(f"{code}: {text}")
+        self.code, self.slot, self.text = code, slot, text
+
+
+class EmulatedBoard:
+    """board.mjs as a child process, with its trace, its exposures and its log."""
+
+    def __init__(self, *arguments, trace=False, exposures=False, image=IMAGE):
+        self.directory = tempfile.TemporaryDirectory(prefix="ols")
+        self.path = pathlib.Path(self.directory.name)
+        self.trace = self.path / "trace.vcd" if trace else None
+        self.listener = self._listen() if exposures else None
+        command = ["node", EMULATOR, "--image", image, "--usb", self.path / "board.sock", "--stats", *arguments]
+        command += ["--vcd", self.trace] if trace else []
+        command += ["--exposures", self.path / "stage.sock"] if exposures else []
+        self.process = subprocess.Popen([str(part) for part in command], stderr=subprocess.PIPE, text=True)
+        self.stage = self.listener.accept()[0].makefile() if exposures else None
+        self.log = ""
+
+    def _listen(self):
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(str(self.path / "stage.sock"))
+        listener.listen(1)
+        return listener
+
+    def plug(self):
+        """Connects the cable, waiting for the board's socket to be there."""
+        for _ in range(500):
+            try:
+                return Link(Usb(self.path / "board.sock"))
+            except (FileNotFoundError, ConnectionRefusedError):
+                assert self.process.poll() is None, self.process.stderr.read()
+                time.sleep(0.02)
+        raise TimeoutError("the board's socket did not come up")
+
+    def exposures_until(self, kind, count):
+        """Reads the exposure stream until `count` messages of `kind` have come; returns all messages but "now"."""
+        found = []
+        while count > 0:
+            message = json.loads(self.stage.readline())
+            count -= message["type"] == kind
+            if message["type"] != "now":
+                found.append(message)
+        return found
+
+    def stop(self):
+        """Ends the process as stagesim does; returns its statistics."""
+        self.process.terminate()
+        if self.stage:
+            while select.select([self.stage], [], [], 0)[0] and self.stage.readline():
+                pass
+        _, self.log = self.process.communicate(timeout=30)
+        assert self.process.returncode == 0, self.log
+        return json.loads(self.log.strip().splitlines()[-1])
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+        self.directory.cleanup()
+
+
+class Link:
+    """Messages over one plugged-in cable."""
+
+    def __init__(self, usb):
+        self.usb = usb
+        self.stream = bytearray()
+        self.request_id = 0
+
+    def ask(self, message_type, payload=b""):
+        """Sends a request and returns the reply's payload. Raises BoardError for an error reply."""
+        self.request_id += 1
+        status = self.usb.write(wire.frame(message_type, self.request_id, payload))
+        if status != OK:
+            raise ConnectionError(f"transfer status {status}")
+        while True:
+            found = wire.take_frame(self.stream)
+            if found is not None and found[1] == self.request_id:
+                break
+            status, data = self.usb.read()
+            if status != OK:
+                raise ConnectionError(f"transfer status {status}")
+            self.stream += data
+        reply_type, _, reply = found
+        if reply_type == wire.ERROR | wire.REPLY:
+            code, slot, text = wire.ERROR_REPLY.unpack(reply)
+            raise BoardError(code, slot, text.rstrip(b"\0").decode())
+        assert reply_type == message_type | wire.REPLY
+        return reply
+
+    def hello(self, layout_hash):
+        names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
+                 "slots_max", "shift_ticks", "slot_gap_ticks")
+        reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
+        return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
+
+    def status(self):
+        names = ("state", "fault", "fault_slot", "boot_nonce", "fault_ticks", "now_ticks", "triggers_fired",
+                 "cycles_played", "log_entries_lost", "program_crc32")
+        return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
+
+    def load(self, program, chunk_bytes=1000):
+        import zlib
+
+        data = wire.program_bytes(program)
+        self.ask(wire.LOAD_BEGIN, wire.LOAD_BEGIN_REQUEST.pack(len(program["slots"]), program["chain_bits"],
+                                                               program["cycles"], len(data), zlib.crc32(data)))
+        for offset in range(0, len(data), chunk_bytes):
+            self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
+        self.ask(wire.LOAD_END)
+
+    def play(self, program):
+        self.load(program)
+        self.ask(wire.ARM)
+        self.ask(wire.START)
+
+    def wait_until(self, states, polls=100_000):
+        """Asks for the status until the board is in one of `states`; returns that status."""
+        for _ in range(polls):
+            status = self.status()
+            if status["state"] in states:
+                return status
+        raise TimeoutError(f"the board stays in state {status['state']}")
+
+    def trigger_log(self, first=0):
+        """All entries from counter `first` on that the board has now, and how many it has lost."""
+        entries = []
+        while True:
+            reply = self.ask(wire.READ_TRIGGER_LOG, first.to_bytes(4, "little") + (48).to_bytes(2, "little") + b"\0\0")
+            _, _, lost, count, _ = wire.LOG_REPLY.unpack_from(reply)
+            for n in range(count):
+                entries.append(wire.LOG_ENTRY.unpack_from(reply, wire.LOG_REPLY.size + n * wire.LOG_ENTRY.size))
+            if count == 0:
+                return entries, lost
+            first = entries[-1][1] + 1

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+# The board's messages and frames, packed by `struct` from protocol/PROTOCOL.md alone: independent of the C code.
+import struct
+import zlib
+
+SYNC = 0x534C
+REPLY = 0x80
+HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT = range(1, 11)
+ERROR = 0x7F
+
+BASIS, TRACKING, MATTE, DARK = range(4)
+IDLE, LOADED, ARMED, PLAYING, DONE, FAULT = range(6)
+FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory")
+ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED = 3, 5, 7
+
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHII")
+STATUS_REPLY = struct.Struct("<BBHIQQIIII")
+LOG_REPLY = struct.Struct("<IIIHH")
+LOG_ENTRY = struct.Struct("<QIIHH")
+ERROR_REPLY = struct.Struct("<HH116s")
+LOAD_BEGIN_REQUEST = struct.Struct("<HHIII")
+SLOT = struct.Struct("<BBHIIi")
+
+
+def frame(message_type, request_id, payload=b""):
+    """One frame: header with its check, payload, CRC-32 of both."""
+    head = struct.pack("<HHHH", SYNC, len(payload), message_type, request_id)
+    head += struct.pack("<H", zlib.crc32(head) & 0xFFFF)
+    return head + payload + struct.pack("<I", zlib.crc32(head + payload))
+
+
+def take_frame(stream):
+    """Takes the first whole frame off the bytearray `stream`: (type, request id, payload), or None if there is none."""
+    if len(stream) < 10:
+        return None
+    sync, size, message_type, request_id, check = struct.unpack_from("<HHHHH", stream)
+    assert sync == SYNC and check == zlib.crc32(stream[:8]) & 0xFFFF, "the stream does not begin with a frame"
+    if len(stream) < 14 + size:
+        return None
+    (crc,) = struct.unpack_from("<I", stream, 10 + size)
+    assert crc == zlib.crc32(stream[: 10 + size]), "bad CRC in a frame from the board"
+    payload = bytes(stream[10 : 10 + size])
+    del stream[: 14 + size]
+    return message_type, request_id, payload
+
+
+def pattern_words(bits):
+    """A list of 0 and 1, chain bit 0 first, as 32-bit words, most significant first."""
+    padded = list(bits) + [0] * (-len(bits) % 32)
+    return [int("".join(map(str, padded[n : n + 32])), 2) for n in range(0, len(padded), 32)]
+
+
+def program_bytes(program):
+    """The slots of a program (see program.py) as they are loaded."""
+    out = bytearray()
+    for slot in program["slots"]:
+        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"], 0)
+        words = pattern_words(slot["bits"])
+        out += struct.pack(f"<{len(words)}I", *words)
+    return bytes(out)

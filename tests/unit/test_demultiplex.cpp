@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+// Demultiplexing: lamps that were multiplexed by hand come back exactly, from any thread count; noise comes out with the
+// variance that the basis promises.
+// links: ols_reflectance
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "reflectance/demultiplex.hpp"
+
+using namespace ols;
+
+namespace {
+
+template <typename T>
+std::vector<const T*> pointers(const std::vector<std::vector<T>>& planes) {
+    std::vector<const T*> out;
+    for (const auto& plane : planes) out.push_back(plane.data());
+    return out;
+}
+
+std::vector<float*> outputs(std::vector<std::vector<float>>& planes) {
+    std::vector<float*> out;
+    for (auto& plane : planes) out.push_back(plane.data());
+    return out;
+}
+
+using Counts = std::vector<std::vector<int32_t>>;
+
+Counts random_lamps(int lamps, size_t samples, int lowest, int highest) {
+    std::mt19937 random(7);
+    std::uniform_int_distribution<int> value(lowest, highest);
+    Counts out(lamps, std::vector<int32_t>(samples));
+    for (auto& plane : out)
+        for (auto& v : plane) v = value(random);
+    return out;
+}
+
+// What a camera sees of each row: the sum of its lit lamps.
+Counts multiplexed(const Basis& basis, const Counts& lamps) {
+    Counts rows(basis.rows, std::vector<int32_t>(lamps[0].size()));
+    for (int r = 0; r < basis.rows; ++r)
+        for (int i = 0; i < basis.lamps; ++i)
+            if (basis.lit(r, i))
+                for (size_t p = 0; p < lamps[i].size(); ++p) rows[r][p] += lamps[i][p];
+    return rows;
+}
+
+std::vector<std::vector<float>> demultiplexed(const Basis& basis, const Counts& rows, DemultiplexOptions options = {}) {
+    std::vector<std::vector<float>> lamps(basis.lamps, std::vector<float>(rows[0].size()));
+    demultiplex(basis, pointers(rows), rows[0].size(), outputs(lamps), options);
+    return lamps;
+}
+
+}  // namespace
+
+class Demultiplex : public testing::TestWithParam<std::string> {
+  protected:
+    const Basis basis = *find_basis(GetParam());
+};
+INSTANTIATE_TEST_SUITE_P(, Demultiplex, testing::ValuesIn(basis_names()));
+
+TEST_P(Demultiplex, signed_integer_lamps_come_back_exactly) {
+    const Counts lamps = random_lamps(basis.lamps, 777, -500, 4000);
+    const auto back = demultiplexed(basis, multiplexed(basis, lamps));
+    for (int i = 0; i < basis.lamps; ++i)
+        for (size_t p = 0; p < lamps[i].size(); ++p) ASSERT_EQ(back[i][p], float(lamps[i][p])) << i << " " << p;
+}
+
+// Rows that saturate a 16-bit camera everywhere are the largest sums there can be.
+TEST_P(Demultiplex, sums_of_16_bit_extremes_do_not_overflow) {
+    Counts rows(basis.rows, std::vector<int32_t>(3));
+    for (int r = 0; r < basis.rows; ++r) rows[r] = {basis.weight(r, 0) > 0 ? 65535 : -65535, 65535, -65535};
+    const auto back = demultiplexed(basis, rows);
+    for (int i = 0; i < basis.lamps; ++i)
+        for (int p = 0; p < 3; ++p) {
+            int64_t sum = 0;
+            for (int r = 0; r < basis.rows; ++r) sum += int64_t(basis.weight(r, i)) * rows[r][p];
+            EXPECT_FLOAT_EQ(back[i][p], float(double(sum) * basis.scale));
+        }
+}
+
+TEST_P(Demultiplex, any_thread_count_gives_the_same_bits) {
+    const Counts rows = random_lamps(basis.rows, 5000, -100, 4095);
+    std::vector<float> gain(5000);
+    for (size_t p = 0; p < gain.size(); ++p) gain[p] = 0.001f * float(p % 17 + 1);
+    const auto one = demultiplexed(basis, rows, {gain, 1});
+    EXPECT_EQ(one, demultiplexed(basis, rows, {gain, 2}));
+    EXPECT_EQ(one, demultiplexed(basis, rows, {gain, 5}));
+}
+
+TEST_P(Demultiplex, float_rows_come_back_within_rounding) {
+    const Counts lamps = random_lamps(basis.lamps, 300, 0, 1000);
+    std::vector<std::vector<float>> rows, back(basis.lamps, std::vector<float>(300));
+    for (const auto& row : multiplexed(basis, lamps)) {
+        rows.emplace_back();
+        for (const int32_t v : row) rows.back().push_back(float(v) * 0.125f);  // exact in float: 18 bits
+    }
+    demultiplex(basis, pointers(rows), 300, outputs(back));
+    for (int i = 0; i < basis.lamps; ++i)
+        for (size_t p = 0; p < 300; ++p) ASSERT_NEAR(back[i][p], lamps[i][p] * 0.125f, 1e-5);
+}
+
+// A lamp that is black everywhere, under rows of 1000 counts and unit noise: what comes out is noise alone.
+TEST_P(Demultiplex, estimated_variance_is_the_variance_of_many_noisy_inversions) {
+    constexpr size_t samples = 4096;
+    std::mt19937 random(11);
+    const NoiseModel model{2.0, 0.5};
+    Counts rows(basis.rows, std::vector<int32_t>(samples));
+    for (int r = 0; r < basis.rows; ++r) {
+        int lit = 0;
+        for (int i = 0; i < basis.lamps; ++i) lit += basis.lit(r, i);
+        const double mean = 100.0 * lit, sigma = model.read_counts + model.shot * std::sqrt(mean);
+        std::normal_distribution<double> count(mean, sigma);
+        for (auto& v : rows[r]) v = int32_t(std::lround(count(random)));
+    }
+    const std::vector<float> gain(samples, 0.5f);
+    const auto lamps = demultiplexed(basis, rows, {gain, 0});
+    double variance = 0;
+    for (const auto& lamp : lamps)
+        for (const float v : lamp) variance += (v - 50.0) * (v - 50.0) / double(samples * lamps.size());
+    std::vector<float> estimate(samples);
+    estimate_variance(basis, pointers(rows), samples, model, gain, estimate.data());
+    const double mean_estimate = std::accumulate(estimate.begin(), estimate.end(), 0.0) / double(samples);
+    EXPECT_NEAR(variance / mean_estimate, 1, 0.03);
+}
+
+TEST(DemultiplexMasks, one_bad_row_marks_its_sample_only) {
+    std::vector<std::vector<uint32_t>> rows(159, std::vector<uint32_t>(10));
+    rows[80][3] = 1, rows[5][3] = 2, rows[158][9] = 4;
+    std::vector<uint32_t> mask(10);
+    combine_masks(pointers(rows), 10, mask.data());
+    EXPECT_EQ(mask, (std::vector<uint32_t>{0, 0, 0, 3, 0, 0, 0, 0, 0, 4}));
+}
+
+// What breaks a multiplexed inversion: one saturated row spreads over all lamps, which is why masks travel.
+TEST(DemultiplexMasks, a_clipped_row_disturbs_every_lamp) {
+    const Basis basis = *find_basis("s159");
+    const Counts lamps = random_lamps(basis.lamps, 1, 10, 60);
+    Counts rows = multiplexed(basis, lamps);
+    rows[40][0] -= 800;
+    const auto back = demultiplexed(basis, rows);
+    for (int i = 0; i < basis.lamps; ++i) EXPECT_FLOAT_EQ(std::abs(back[i][0] - float(lamps[i][0])), 10);
+}

@@ -1,0 +1,59 @@
+#!/usr/bin/env node
+// SPDX-License-Identifier: MIT
+// The emulated board: runs the firmware image on an RP2040 model and connects it to a host and a virtual stage.
+import { Board } from './board_model.mjs';
+import { ExposureRecorder } from './exposures.mjs';
+import { ExposureSocket } from './exposure_socket.mjs';
+import { readImage } from './image.mjs';
+import { parseOptions, USAGE } from './options.mjs';
+import { Pacer } from './pacer.mjs';
+import { UsbSocket } from './usb_socket.mjs';
+import { VcdWriter } from './vcd.mjs';
+
+const TICK_HZ = 125_000_000;
+
+async function main() {
+  const options = parseOptions(process.argv.slice(2));
+  if (options.help) {
+    process.stdout.write(USAGE);
+    return;
+  }
+  const log = (text) => process.stderr.write(`board: ${text}\n`);
+  const image = readImage(options.image);
+  const vcd = options.vcd ? new VcdWriter(options.vcd) : null;
+  const stage = options.exposures ? await ExposureSocket.open(options.exposures, options.pace === 'wall') : null;
+  const recorder = stage ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure)) : null;
+
+  const board = new Board(image, {
+    naive: options.naive,
+    seed: options.seed,
+    injections: options.inject,
+    log,
+    onEdge: (tick, levels) => {
+      vcd?.edge(tick, levels);
+      recorder?.edge(tick, levels);
+    },
+    onReset: (cause) => {
+      usb?.drop();
+      stage?.send({ type: 'reset', cause });
+    },
+    onUnplug: () => usb?.drop(),
+  });
+  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage });
+  const usb = options.usb ? new UsbSocket(options.usb, () => board.usbHost, () => pacer.wake(), log) : null;
+  await usb?.listen();
+
+  stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });
+  for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => pacer.stop());
+  await pacer.run();
+
+  usb?.close();
+  vcd?.close(board.tick);
+  await stage?.end();
+  if (options.stats) process.stderr.write(`${JSON.stringify({ ...pacer.statistics, dropped: stage?.dropped ?? 0 })}\n`);
+}
+
+main().catch((error) => {
+  process.stderr.write(`board: ${error.message}\n`);
+  process.exitCode = 1;
+});

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+// The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
+// faults that are due.
+import { buildChip, onceLogger } from './chip.mjs';
+import { boot } from './image.mjs';
+import { PIN_MASK, TRIGGERS } from './pins.mjs';
+import { Cause, watchdogLegacy } from './system.mjs';
+import { UsbHost } from './usb_host.mjs';
+
+const TRIGGER_MASK = TRIGGERS.reduce((mask, gpio) => mask | (1 << gpio), 0);
+
+export class Board {
+  #image;
+  #options;
+  #logger;
+  #epoch = 0; // tick of the chip's cycle 0
+  #parts;
+  #levels = 0;
+  #boots = 0;
+  #triggers = 0;
+  #injections;
+  #resetCause = null; // of a reset that is due
+
+  /**
+   * @param {object} image from readImage
+   * @param {object} options
+   * @param {boolean} options.naive
+   * @param {number} options.seed
+   * @param {object[]} options.injections from parseInjection
+   * @param {(text: string) => void} options.log
+   * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
+   * @param {(cause: string) => void} options.onReset
+   * @param {() => void} options.onUnplug by a fault
+   */
+  constructor(image, options) {
+    this.#image = image;
+    this.#options = options;
+    this.#injections = [...options.injections];
+    this.#logger = onceLogger(options.log);
+    this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
+  }
+
+  get chip() {
+    return this.#parts.chip;
+  }
+
+  get tick() {
+    return this.#epoch + this.#parts.time.cycle;
+  }
+
+  /** Cycles in which the processor was awake, since the last reset. */
+  get awakeCycles() {
+    return this.#parts.lockstep.awakeCycles;
+  }
+
+  /** True if PIO and DMA do nothing by themselves and the bus is idle. */
+  get quiet() {
+    return this.#parts.lockstep.quiet && !this.usbHost.active;
+  }
+
+  get nextAlarmTick() {
+    return this.#epoch + this.#parts.lockstep.nextAlarmCycle;
+  }
+
+  /** Runs until `end`, at most some cycles past it. */
+  run(end) {
+    while (this.tick < end) {
+      this.#injectDue();
+      const faults = this.#injections.map(({ tick }) => tick);
+      const until = Math.min(end, ...faults) - this.#epoch;
+      this.#parts.lockstep.run(until, () => this.#resetCause !== null || this.#triggerFaultDue);
+      if (this.#resetCause !== null) this.reset(this.#resetCause);
+    }
+  }
+
+  /** Starts the chip anew. What the watchdog keeps is kept if it was the cause, or lost with the power. */
+  reset(cause) {
+    const kept = watchdogLegacy(this.chip);
+    if (cause === Cause.RUN_PIN) kept.reason = 0;
+    if (cause === Cause.WATCHDOG && kept.reason === 0) kept.reason = 1; // TIMER
+    this.#resetCause = null;
+    this.#options.log(`reset at tick ${this.tick}: ${cause}`);
+    this.#edge(this.tick, 0);
+    this.#epoch = this.tick;
+    this.#start(cause, kept);
+    this.#options.onReset(cause);
+  }
+
+  /** The processor stops for good, as if the program had gone astray; the rest of the chip goes on. */
+  hang() {
+    this.chip.core.enabledInterrupts = 0;
+    this.chip.core.waiting = true;
+  }
+
+  unplug() {
+    this.usbHost.unplug();
+    this.#options.onUnplug();
+  }
+
+  #start(cause, { reason, scratch }) {
+    const seed = this.#options.seed * 0x10000 + this.#boots++;
+    const onWatchdog = () => {
+      this.#resetCause = Cause.WATCHDOG;
+      this.chip.core.waiting = false; // so that the lock step comes back at once
+    };
+    const start = { cause, reason, scratch, seed, onWatchdog };
+    this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
+    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & PIN_MASK);
+    this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
+    boot(this.chip, this.#image);
+  }
+
+  #edge(tick, levels) {
+    if (levels === this.#levels) return;
+    if (levels & ~this.#levels & TRIGGER_MASK) this.#triggers++;
+    this.#levels = levels;
+    this.#options.onEdge(tick, levels);
+  }
+
+  get #triggerFaultDue() {
+    return this.#injections.some(({ trigger }) => trigger <= this.#triggers);
+  }
+
+  #injectDue() {
+    const due = this.#injections.filter(({ tick, trigger }) => tick <= this.tick || trigger <= this.#triggers);
+    this.#injections = this.#injections.filter((injection) => !due.includes(injection));
+    for (const { name, inject } of due) {
+      this.#options.log(`injected at tick ${this.tick}: ${name}`);
+      inject(this);
+    }
+  }
+}

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// One RP2040 from a reset to the next: rp2040js with the parts that time or the program would notice put right.
+import { RP2040 } from 'rp2040js';
+import { correctDma } from './dma.mjs';
+import { Lockstep } from './lockstep.mjs';
+import { Pads } from './pads.mjs';
+import { Pio } from './pio.mjs';
+import { correctProcessor } from './processor.mjs';
+import { correctSystem } from './system.mjs';
+import { UsbController } from './usb_controller.mjs';
+
+const PIO_PAGES = [0x50200, 0x50300];
+const USB_PAGE = 0x50110;
+
+/**
+ * Cycles are those of clk_sys and count from the reset; one is 8 ns from the first on, as if the program found its
+ * 125 MHz already running. Both cores' flash and SRAM answer without wait states, and there is one core.
+ * @param {{naive?: boolean, start: object, logger: object}} options `start` as correctSystem takes it
+ */
+export function buildChip({ naive = false, start, logger }) {
+  const time = { cycle: 0 };
+  const chip = new RP2040();
+  chip.logger = logger;
+  const pads = new Pads(time);
+  chip.pio = PIO_PAGES.map((page, index) => {
+    chip.peripherals[page] = new Pio(chip, { index, pads, time, naive });
+    return chip.peripherals[page];
+  });
+  chip.usbCtrl = new UsbController(chip);
+  chip.peripherals[USB_PAGE] = chip.usbCtrl;
+  correctProcessor(chip);
+  correctDma(chip);
+  correctSystem(chip, start);
+  pads.attach(chip);
+  return { chip, pads, time, lockstep: new Lockstep(chip, pads, time, naive) };
+}
+
+/** rp2040js' messages, each text once: it warns of the same register at every access. */
+export function onceLogger(write) {
+  const said = new Set();
+  const say = (name, message) => {
+    const text = `${name}: ${message}`;
+    if (said.size < 100 && !said.has(text)) write(text);
+    said.add(text);
+  };
+  return { debug: () => {}, info: () => {}, warn: say, error: say };
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// The command line of the emulated board.
+import { parseArgs } from 'node:util';
+import { parseInjection } from './injections.mjs';
+
+export const USAGE = `usage: node board.mjs --image FILE [options]
+
+Runs the board's firmware, the same image that is flashed, on an emulated RP2040.
+
+  --image FILE        firmware, .elf or .uf2
+  --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
+  --exposures SOCKET  connect there and send every exposure as a JSON line
+  --vcd FILE          write the board's signals as a value change dump
+  --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
+  --pace wall         at most as fast as the wall clock; exposures that nobody takes in time are dropped and counted
+  --chain-bits N      length of the lamps' shift chain (default 176)
+  --naive             step every cycle: slow, for checking the fast way
+  --cycles-limit N    end after N ticks of 8 ns
+  --seed N            of the chip's random bits (default 1)
+  --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; WHEN is a tick, or trigger:N for the
+                      N-th rise of any trigger; may be given several times
+  --stats             print ticks, speed and dropped lines as JSON at the end
+  --help
+
+example: node board.mjs --image build/firmware/stage.elf --usb /run/user/1000/board.sock --vcd trace.vcd
+`;
+
+/** @throws {Error} with what to do about it */
+export function parseOptions(args) {
+  const text = { type: 'string' };
+  const flag = { type: 'boolean', default: false };
+  let values;
+  try {
+    ({ values } = parseArgs({
+      args,
+      options: {
+        image: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
+        'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
+        inject: { type: 'string', multiple: true, default: [] }, stats: flag, help: flag,
+      },
+    }));
+  } catch (error) {
+    throw new Error(`${error.message}; see --help`);
+  }
+  if (values.help) return values;
+  if (!values.image) throw new Error('--image is missing; see --help');
+  if (!['virtual', 'wall'].includes(values.pace)) throw new Error(`--pace ${values.pace}: it is virtual or wall`);
+  const chainBits = integer('--chain-bits', values['chain-bits'], 4);
+  if (chainBits % 4 !== 0) throw new Error(`--chain-bits ${chainBits}: not a multiple of 4`);
+  return {
+    ...values,
+    chainBits,
+    seed: integer('--seed', values.seed, 0),
+    cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
+    inject: values.inject.map(parseInjection),
+  };
+}
+
+function integer(name, text, least) {
+  const value = Number(text);
+  if (!Number.isSafeInteger(value) || value < least) throw new Error(`${name} ${text}: not a whole number >= ${least}`);
+  return value;
+}

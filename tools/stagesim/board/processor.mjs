@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// Corrections to rp2040js' Cortex-M0+ core: sleeping, waking and faulting as the ARMv6-M manual has it.
+
+const EXC_HARDFAULT = 3;
+const ENTRY_CYCLES = 15; // Cortex-M0+ TRM 3.4.1 with zero wait states; the return takes about as long
+const RETURN_CYCLES = 13;
+
+/**
+ * Stock: WFI with an interrupt already pending sleeps for ever, WFI under PRIMASK enters the handler, exceptions cost
+ * no time and breakpoints do nothing.
+ * @param {import('rp2040js').RP2040} chip
+ */
+export function correctProcessor(chip) {
+  const { core } = chip;
+  core.extraCycles = 0;
+
+  const enter = core.exceptionEntry;
+  core.exceptionEntry = (number) => {
+    core.extraCycles += ENTRY_CYCLES;
+    enter.call(core, number);
+  };
+  const leave = core.exceptionReturn;
+  core.exceptionReturn = (value) => {
+    core.extraCycles += RETURN_CYCLES;
+    leave.call(core, value);
+  };
+
+  // An interrupt only ends the sleep; the next instruction boundary takes it, or not under PRIMASK.
+  core.setInterrupt = (number, active) => {
+    const bit = 1 << number;
+    if (!active) {
+      core.pendingInterrupts &= ~bit;
+      return;
+    }
+    if (core.pendingInterrupts & bit) return;
+    core.pendingInterrupts |= bit;
+    core.interruptsUpdated = true;
+    if (core.waiting && wakePending(core)) core.waiting = false;
+  };
+
+  // A BKPT without a debugger, and UDF, fault (ARMv6-M B1.5.6).
+  chip.onBreak = () => raiseHardFault(chip);
+}
+
+/** Enters the HardFault handler at the next instruction. */
+export function raiseHardFault(chip) {
+  chip.core.waiting = false;
+  chip.core.exceptionEntry(EXC_HARDFAULT);
+  chip.core.PC &= ~1;
+}
+
+/** Whether an exception is pending that would end a WFI: PRIMASK does not matter (ARMv6-M B1.5.19). */
+function wakePending(core) {
+  return (core.pendingInterrupts & core.enabledInterrupts) !== 0 || core.pendingNMI || core.pendingSystick ||
+    core.pendingPendSV;
+}
+
+/**
+ * Runs one instruction and returns its cycles. Afterwards `core.waiting` is true if nothing but an interrupt can make
+ * the program go on: WFI, or a branch to itself.
+ */
+export function runInstruction(core) {
+  const from = core.PC;
+  const cycles = core.executeInstruction() + core.extraCycles;
+  core.extraCycles = 0;
+  if (core.PC === from) core.waiting = true;
+  if (core.waiting && wakePending(core)) core.waiting = false;
+  return cycles;
+}

@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: MIT
+// The host's end of the USB cable: finds the device, configures it, keeps frames going and carries transfers, all in
+// board time. One transaction at a time is on the bus, as long as its bytes take at 12 Mbit/s.
+import { Handshake } from './usb_controller.mjs';
+import { BulkInTransfer, BulkOutTransfer, ControlTransfer, Status } from './usb_transfer.mjs';
+
+const MS = 1_000_000; // ns
+const DEBOUNCE_NS = 100 * MS; // USB 2.0 7.1.7.3
+const RESET_NS = 10 * MS; // USB 2.0 7.1.7.5
+const RECOVERY_NS = 10 * MS; // USB 2.0 7.1.7.5
+const SET_ADDRESS_NS = 2 * MS; // USB 2.0 9.2.6.3
+const REQUEST_NS = 5000 * MS; // USB 2.0 9.2.6.1
+const SUSPEND_NS = 3 * MS; // USB 2.0 7.1.7.6
+const FRAME_NS = MS;
+const OVERHEAD_BYTES = 13; // of a bulk transaction: sync, PIDs, CRCs, gaps (USB 2.0 5.8.4)
+const BYTE_NS = 8e9 / 12e6;
+const CYCLE_NS = 8;
+const ADDRESS = 1;
+
+const GET_DESCRIPTOR = 6;
+const SET_ADDRESS = 5;
+const SET_CONFIGURATION = 9;
+const CLEAR_FEATURE = 1;
+const DESCRIPTOR_DEVICE = 1;
+const DESCRIPTOR_CONFIGURATION = 2;
+const DESCRIPTOR_ENDPOINT = 5;
+
+export class UsbHost {
+  #clock;
+  #controller;
+  #state = 'unplugged'; // searching, resetting, configuring, configured, failed
+  #address = 0;
+  #frame = 0;
+  #queues = new Map(); // pipe -> entries, the first is on the bus
+  #waiting = []; // submitted before the device was configured
+  #lastPipe = -1;
+  #toggles = new Map();
+  #packetBytes = new Map([[0, 64]]);
+  #onBus = null;
+  #stepAlarm;
+  #nextStep = () => {};
+  #busAlarm;
+  #frameAlarm;
+  #suspendAlarm;
+  #log;
+
+  /**
+   * @param {object} clock of the chip (createAlarm)
+   * @param {import('./usb_controller.mjs').UsbController} controller
+   * @param {(message: string) => void} log
+   */
+  constructor(clock, controller, log) {
+    this.#clock = clock;
+    this.#controller = controller;
+    this.#log = log;
+    this.#stepAlarm = new Alarm(clock, () => this.#nextStep());
+    this.#busAlarm = new Alarm(clock, () => this.#endTransaction());
+    this.#frameAlarm = new Alarm(clock, () => this.#startFrame());
+    this.#suspendAlarm = new Alarm(clock, () => this.#controller.suspend());
+    controller.onReady = () => this.#deviceMayHaveChanged();
+  }
+
+  /** True while something is under way that only needs time to pass. */
+  get active() {
+    return this.#onBus !== null || this.#suspendAlarm.scheduled || this.#state === 'resetting' ||
+      this.#state === 'configuring';
+  }
+
+  /** True while transfers wait for the device to answer. */
+  get pending() {
+    return this.#waiting.length > 0 || [...this.#queues.values()].some((queue) => queue.length > 0);
+  }
+
+  plug() {
+    this.#suspendAlarm.cancel();
+    this.#controller.setPowered(true);
+    this.#state = 'searching';
+    this.#deviceMayHaveChanged();
+  }
+
+  /** The device sees its power go, and 3 ms later an idle bus. */
+  unplug() {
+    if (this.#state === 'unplugged') return;
+    this.#lose('unplugged');
+    this.#controller.setPowered(false);
+    this.#suspendAlarm.schedule(SUSPEND_NS);
+  }
+
+  /**
+   * @param {{type: 'control' | 'bulk', endpoint: number, setup?: Uint8Array, data?: Uint8Array, capacity?: number,
+   *          timeout_us: number, done: (status: number, bytes: Uint8Array) => void}} request
+   *   endpoint has bit 7 set for IN; timeout in board time, 0 for none
+   * @returns {object} a handle for cancel()
+   */
+  submit(request) {
+    const entry = { request, transfer: null, deadline: null };
+    if (request.timeout_us > 0) {
+      entry.deadline = new Alarm(this.#clock, () => this.#finish(entry, Status.TIMED_OUT));
+      entry.deadline.schedule(request.timeout_us * 1000);
+    }
+    if (this.#state === 'configured') this.#enqueue(entry);
+    else if (this.#state === 'failed') this.#finish(entry, Status.DISCONNECTED);
+    else this.#waiting.push(entry);
+    return entry;
+  }
+
+  cancel(entry) {
+    this.#finish(entry, Status.CANCELLED);
+  }
+
+  // Finding and configuring the device
+
+  #deviceMayHaveChanged() {
+    const { attached } = this.#controller;
+    if (attached && this.#state === 'searching') {
+      this.#state = 'resetting';
+      this.#after(DEBOUNCE_NS + RESET_NS, () => this.#endReset());
+    } else if (!attached && !['unplugged', 'searching'].includes(this.#state)) {
+      this.#lose('searching');
+    } else {
+      this.#startTransaction();
+    }
+  }
+
+  #after(delay_ns, step) {
+    this.#nextStep = step;
+    this.#stepAlarm.schedule(delay_ns);
+  }
+
+  #lose(state) {
+    this.#state = state;
+    for (const alarm of [this.#stepAlarm, this.#busAlarm, this.#frameAlarm]) alarm.cancel();
+    this.#onBus = null;
+    const lost = [...this.#waiting, ...[...this.#queues.values()].flat()];
+    for (const entry of lost) this.#finish(entry, Status.DISCONNECTED);
+    this.#queues.clear();
+    this.#toggles.clear();
+  }
+
+  #endReset() {
+    this.#address = 0;
+    this.#controller.busReset();
+    this.#frameAlarm.schedule(FRAME_NS);
+    this.#after(RECOVERY_NS, () => this.#configure());
+  }
+
+  /** The order of requests is that of common hosts; descriptors are read as USB 2.0 9.6 lays them out. */
+  #configure() {
+    this.#state = 'configuring';
+    this.#ask([0x80, GET_DESCRIPTOR, 0, DESCRIPTOR_DEVICE, 0, 0, 8, 0], (device) => {
+      this.#packetBytes.set(0, device[7]);
+      this.#ask([0x00, SET_ADDRESS, ADDRESS, 0, 0, 0, 0, 0], () => {
+        this.#address = ADDRESS;
+        this.#after(SET_ADDRESS_NS, () => this.#readConfiguration());
+      });
+    });
+  }
+
+  #readConfiguration() {
+    this.#ask([0x80, GET_DESCRIPTOR, 0, DESCRIPTOR_CONFIGURATION, 0, 0, 9, 0], (head) => {
+      this.#ask([0x80, GET_DESCRIPTOR, 0, DESCRIPTOR_CONFIGURATION, 0, 0, head[2], head[3]], (whole) => {
+        for (let at = 0; at + 1 < whole.length && whole[at] > 0; at += whole[at]) {
+          if (whole[at + 1] !== DESCRIPTOR_ENDPOINT) continue;
+          this.#packetBytes.set(whole[at + 2], whole[at + 4] | (whole[at + 5] << 8));
+        }
+        this.#ask([0x00, SET_CONFIGURATION, whole[5], 0, 0, 0, 0, 0], () => this.#configured());
+      });
+    });
+  }
+
+  #ask(setup, next) {
+    const done = (status, bytes) => {
+      if (status === Status.OK) {
+        next(bytes);
+      } else if (this.#state === 'configuring') {
+        this.#log(`usb: the device answered request ${setup[1]} with status ${status}; giving up on it`);
+        this.#lose('failed');
+      }
+    };
+    const request = { type: 'control', endpoint: 0, setup: Uint8Array.from(setup), timeout_us: REQUEST_NS / 1000, done };
+    const entry = { request, transfer: null, deadline: new Alarm(this.#clock, () => this.#finish(entry, Status.TIMED_OUT)) };
+    entry.deadline.schedule(REQUEST_NS);
+    this.#enqueue(entry);
+  }
+
+  #configured() {
+    this.#state = 'configured';
+    this.#toggles.clear();
+    const waiting = this.#waiting;
+    this.#waiting = [];
+    for (const entry of waiting) this.#enqueue(entry);
+  }
+
+  // Carrying transfers
+
+  #enqueue(entry) {
+    const { request } = entry;
+    const number = request.endpoint & 0x0f;
+    if (request.type === 'control') {
+      entry.transfer = new ControlTransfer(request.setup, request.data);
+      entry.transfer.packetBytes = this.#packetBytes.get(0);
+      this.#noteHaltCleared(request.setup);
+    } else {
+      const packetBytes = this.#packetBytes.get(request.endpoint);
+      if (packetBytes === undefined) {
+        this.#finish(entry, Status.STALL);
+        return;
+      }
+      const toggle = this.#toggle(request.endpoint);
+      entry.transfer = request.endpoint & 0x80
+        ? new BulkInTransfer(number, request.capacity, toggle, packetBytes)
+        : new BulkOutTransfer(number, request.data, toggle, packetBytes);
+    }
+    const { pipe } = entry.transfer;
+    if (!this.#queues.has(pipe)) this.#queues.set(pipe, []);
+    this.#queues.get(pipe).push(entry);
+    this.#startTransaction();
+  }
+
+  #toggle(endpoint) {
+    if (!this.#toggles.has(endpoint)) this.#toggles.set(endpoint, { data1: false });
+    return this.#toggles.get(endpoint);
+  }
+
+  /** Clearing an endpoint's halt starts its data toggle again (USB 2.0 9.4.5). */
+  #noteHaltCleared(setup) {
+    if (setup[0] === 0x02 && setup[1] === CLEAR_FEATURE) this.#toggle(setup[4]).data1 = false;
+  }
+
+  /** Puts the next transaction on the bus, pipe after pipe, skipping those that would only be NAKed. */
+  #startTransaction() {
+    if (this.#onBus !== null) return;
+    const pipes = [...this.#queues.keys()].sort((a, b) => a - b);
+    const start = pipes.findIndex((pipe) => pipe > this.#lastPipe);
+    const order = start < 0 ? pipes : [...pipes.slice(start), ...pipes.slice(0, start)];
+    for (const pipe of order) {
+      const entry = this.#queues.get(pipe)[0];
+      if (entry === undefined) continue;
+      const token = entry.transfer.token();
+      if (!token.setup && !this.#controller.ready(token.endpoint, token.out !== undefined)) continue;
+      this.#lastPipe = pipe;
+      this.#onBus = { entry, token };
+      const bytes = (token.setup ?? token.out)?.length ?? entry.transfer.packetBytes;
+      this.#busAlarm.schedule((OVERHEAD_BYTES + bytes) * BYTE_NS);
+      return;
+    }
+  }
+
+  #endTransaction() {
+    const { entry, token } = this.#onBus;
+    this.#onBus = null;
+    const answer = this.#transact(token);
+    if (answer.handshake !== Handshake.NAK) {
+      const status = entry.transfer.answered(answer);
+      if (status !== null) this.#finish(entry, status);
+    }
+    this.#startTransaction();
+  }
+
+  #transact({ endpoint, setup, out, data1 }) {
+    if (this.#controller.address !== this.#address) return { handshake: Handshake.SILENT };
+    if (setup) return { handshake: this.#controller.setup(setup) };
+    return out ? this.#controller.out(endpoint, out, data1) : this.#controller.in(endpoint);
+  }
+
+  #finish(entry, status) {
+    entry.deadline?.cancel();
+    const queue = entry.transfer ? this.#queues.get(entry.transfer.pipe) : this.#waiting;
+    const place = queue ? queue.indexOf(entry) : -1;
+    if (place >= 0) queue.splice(place, 1);
+    if (this.#onBus?.entry === entry) {
+      this.#busAlarm.cancel();
+      this.#onBus = null;
+    }
+    const { done } = entry.request;
+    entry.request.done = () => {};
+    done(status, entry.transfer && status === Status.OK ? entry.transfer.bytes : new Uint8Array(0));
+    this.#startTransaction();
+  }
+
+  #startFrame() {
+    this.#frame = (this.#frame + 1) & 0x7ff;
+    this.#frameAlarm.schedule(FRAME_NS);
+    this.#controller.startOfFrame(this.#frame);
+  }
+}
+
+/** An alarm of the chip's clock, on whole cycles. */
+class Alarm {
+  #alarm;
+
+  constructor(clock, ring) {
+    this.#alarm = clock.createAlarm(ring);
+  }
+
+  get scheduled() {
+    return this.#alarm.scheduled;
+  }
+
+  schedule(delay_ns) {
+    this.#alarm.schedule(Math.round(delay_ns / CYCLE_NS) * CYCLE_NS);
+  }
+
+  cancel() {
+    if (this.#alarm.scheduled) this.#alarm.cancel();
+  }
+}

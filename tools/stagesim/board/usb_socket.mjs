@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// The USB cable as a socket: a client that connects plugs the board in, its requests are transfers
+// (docs/architecture.md, "USB transfers over a socket").
+import { existsSync, lstatSync, unlinkSync } from 'node:fs';
+import { createServer } from 'node:net';
+
+const REQUEST_MAGIC = 0x54425355; // "USBT"
+const REPLY_MAGIC = 0x52425355; // "USBR"
+const HEADER_BYTES = 28;
+const REPLY_BYTES = 16;
+const PAYLOAD_LIMIT = 1 << 20;
+const TYPES = ['control', 'bulk', 'cancel'];
+
+export class UsbSocket {
+  #server;
+  #path;
+  #client = null;
+  #input = Buffer.alloc(0);
+  #inFlight = new Map(); // tag -> handle of the host
+  #host;
+  #log;
+
+  /**
+   * @param {() => import('./usb_host.mjs').UsbHost} host the chip's at this moment
+   * @param {() => void} onActivity called when something has come in
+   */
+  constructor(path, host, onActivity, log) {
+    this.#path = path;
+    this.#host = host;
+    this.#log = log;
+    this.onActivity = onActivity;
+    this.#server = createServer((socket) => this.#accept(socket));
+  }
+
+  /** @returns {Promise<void>} listening; an old socket file of that name is replaced, any other file is not */
+  listen() {
+    if (existsSync(this.#path)) {
+      if (!lstatSync(this.#path).isSocket()) {
+        return Promise.reject(new Error(`${this.#path}: exists and is not a socket; remove it or name another`));
+      }
+      unlinkSync(this.#path);
+    }
+    return new Promise((resolve, reject) => {
+      this.#server.once('error', (error) => reject(new Error(`${this.#path}: cannot listen (${error.code})`)));
+      this.#server.listen(this.#path, resolve);
+    });
+  }
+
+  get connected() {
+    return this.#client !== null;
+  }
+
+  /** The device has gone: pending transfers have been answered, the client must connect anew. */
+  drop() {
+    this.#client?.destroySoon(); // once what was written has gone out
+    this.#forget();
+  }
+
+  close() {
+    this.drop();
+    this.#server.close();
+  }
+
+  #accept(socket) {
+    if (this.#client !== null) {
+      this.#log('usb: a second client was turned away');
+      socket.destroy();
+      return;
+    }
+    this.#client = socket;
+    socket.on('data', (bytes) => {
+      if (socket === this.#client) this.#receive(bytes);
+    });
+    socket.on('error', () => {}); // 'close' follows
+    socket.on('close', () => {
+      if (socket !== this.#client) return;
+      this.#forget();
+      this.#host().unplug();
+      this.onActivity();
+    });
+    this.#host().plug();
+    this.onActivity();
+  }
+
+  #forget() {
+    this.#client = null;
+    this.#input = Buffer.alloc(0);
+    this.#inFlight.clear();
+  }
+
+  #receive(bytes) {
+    this.#input = this.#input.length === 0 ? bytes : Buffer.concat([this.#input, bytes]);
+    while (this.#input.length >= HEADER_BYTES) {
+      const request = this.#parse();
+      if (request === undefined) {
+        this.#client.destroy();
+        return;
+      }
+      const total = HEADER_BYTES + request.payloadBytes;
+      if (this.#input.length < total) break;
+      request.data = Uint8Array.from(this.#input.subarray(HEADER_BYTES, total));
+      this.#input = this.#input.subarray(total);
+      this.#start(request);
+    }
+    this.onActivity();
+  }
+
+  /** @returns the request's header, or undefined if this is none: then there is no telling where the next begins */
+  #parse() {
+    const input = this.#input;
+    const type = TYPES[input[8]];
+    const endpoint = input[9];
+    const length = input.readUInt32LE(12);
+    if (input.readUInt32LE(0) !== REQUEST_MAGIC || type === undefined || length > PAYLOAD_LIMIT) {
+      this.#log('usb: not a transfer request; the client is cut off');
+      return undefined;
+    }
+    const setup = Uint8Array.from(input.subarray(20, 28));
+    const toHost = type === 'control' ? (setup[0] & 0x80) !== 0 : (endpoint & 0x80) !== 0;
+    const payloadBytes = type === 'cancel' || toHost ? 0 : length;
+    return { tag: input.readUInt32LE(4), type, endpoint, capacity: length, timeout_us: input.readUInt32LE(16), setup,
+             payloadBytes };
+  }
+
+  #start(request) {
+    const { tag, type } = request;
+    if (type === 'cancel') {
+      const handle = this.#inFlight.get(tag);
+      if (handle) this.#host().cancel(handle);
+      return;
+    }
+    const client = this.#client;
+    let finished = false;
+    const done = (status, bytes) => {
+      finished = true;
+      this.#inFlight.delete(tag);
+      const header = Buffer.alloc(REPLY_BYTES);
+      header.writeUInt32LE(REPLY_MAGIC, 0);
+      header.writeUInt32LE(tag, 4);
+      header.writeInt32LE(status, 8);
+      header.writeUInt32LE(bytes.length, 12);
+      if (!client.destroyed && client.writable) client.write(Buffer.concat([header, bytes]));
+    };
+    const handle = this.#host().submit({ ...request, done });
+    if (!finished) this.#inFlight.set(tag, handle);
+  }
+}
