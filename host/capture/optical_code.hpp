@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The optical code: what frames look like tells where in the cycle they are. Tracking and matte slots look like the
-// last of their kind, dark slots like black; a basis slot may look like anything.
+// The optical code: what frames look like tells where in the cycle they are. The landmarks are tracking and matte slots,
+// which look like the last of their kind, and dark slots, which look like black. A basis slot may look like anything;
+// a kind of landmark that some basis slot looks like (a lamp behind the subject is dark, half of the lamps for twice the
+// time are as bright as tracking) proves nothing any more, and still refutes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -13,7 +16,12 @@
 
 namespace ols {
 
-enum class Sight { silent, agrees, disagrees };
+enum class Sight {
+    disagrees,
+    silent,  // nothing is known of how this slot looks
+    agrees,  // as its kind does, but basis slots have looked so too
+    proves,  // as only its kind does
+};
 
 class OpticalCode {
   public:
@@ -27,7 +35,8 @@ class OpticalCode {
     // the first lit frame of its kind.
     Sight look(uint64_t counter, const FrameSummary& summary) const;
 
-    // Takes a frame of a proved slot as what its kind looks like from now on.
+    // Takes a frame of a proved slot: a landmark is what its kind looks like from now on, a basis slot shows which kinds
+    // it can be taken for.
     void learn(uint64_t counter, const FrameSummary& summary);
 
     struct Seen {
@@ -35,16 +44,24 @@ class OpticalCode {
         const FrameSummary* summary;
     };
 
-    // The counter of position 0 in [first, last] that no frame disagrees with, if there is exactly one and a dark, a
-    // matte and a tracking slot agree with it.
-    std::optional<uint64_t> find_unique(std::span<const Seen> frames, uint64_t first, uint64_t last) const;
+    // Which counters of position 0 in [first, last] no frame disagrees with.
+    struct Search {
+        int possible = 0;      // 0, 1, or 2 for more than one
+        uint64_t counter = 0;  // the first of them
+        bool proved = false;   // a dark, a matte and a tracking slot look as they should at it
+    };
+    Search search(std::span<const Seen> frames, uint64_t first, uint64_t last) const;
 
   private:
-    // Agrees when the three kinds of landmark do, disagrees when one frame does.
+    // Proves when all three kinds of landmark look as they should, disagrees when one frame does not.
     Sight look_at_all(std::span<const Seen> frames, uint64_t counter_of_first) const;
+
+    // Whether a frame looks like a landmark's kind; nothing before the first of its kind.
+    std::optional<bool> looks_like(SlotKind kind, const FrameSummary& summary) const;
 
     std::vector<SlotKind> cycle_;
     std::optional<FrameSummary> tracking_, matte_;
+    std::array<bool, 4> mistakable_{};  // by SlotKind: some basis slot has looked like it
 };
 
 // Frames of one kind a group apart (8 ms in the paper) differ by noise and motion; a quarter leaves room for the first

@@ -116,10 +116,8 @@ bool FramePlacer::append(FrameWitness& frame) {
 void FramePlacer::place(Pending pending) {
     if (locked_) return examine(std::move(pending));
     unlocked_.push_back(std::move(pending));
-    if (unlocked_.size() > options_.pending_max) {
-        refuse(unlocked_.front().frame, "its place in the cycle was not proved before memory ran out");
-        unlocked_.pop_front();
-    }
+    if (unlocked_.size() > options_.pending_max)
+        give_up_oldest(1, "its place in the cycle was not proved before memory ran out");
     if (last_position_ + 1 < next_attempt_) return;
     next_attempt_ = last_position_ + 1 + group_slots_;
     try_lock();
@@ -134,14 +132,28 @@ void FramePlacer::try_lock() {
             end = std::min(end, pending.frame.fired_before - std::min(pending.frame.fired_before, pending.position));
     }
     if (end <= next_counter_) return;
-    const auto found = code_.find_unique(seen, next_counter_, end - 1);
-    if (!found) return;
+    const OpticalCode::Search found = code_.search(seen, next_counter_, end - 1);
+    if (found.possible == 0) return give_up_oldest(group_slots_, "no place in the cycle fits it");
+    if (found.possible > 1 || !found.proved) return;
     locked_ = true;
-    first_counter_ = *found;
-    // The first of each kind become what the later ones are compared with; the search has compared them all.
-    for (auto pending = unlocked_.rbegin(); pending != unlocked_.rend(); ++pending)
-        if (pending->frame.whole) code_.learn(counter_of(*pending), pending->frame.summary);
+    first_counter_ = found.counter;
+    // Landmarks from last to first, so that the first of each kind is what the next one is compared with; then what basis
+    // slots can be taken for.
+    const auto learn_basis = [&](bool basis, const Pending& pending) {
+        const uint64_t counter = counter_of(pending);
+        if (pending.frame.whole && (code_.kind_at(counter) == SlotKind::basis) == basis)
+            code_.learn(counter, pending.frame.summary);
+    };
+    for (auto pending = unlocked_.rbegin(); pending != unlocked_.rend(); ++pending) learn(false, *pending);
+    for (const Pending& pending : unlocked_) learn(true, pending);
     for (Pending& pending : std::exchange(unlocked_, {})) examine(std::move(pending));
+}
+
+void FramePlacer::give_up_oldest(size_t count, const std::string& why) {
+    for (; count > 0 && !unlocked_.empty(); --count) {
+        refuse(unlocked_.front().frame, why);
+        unlocked_.pop_front();
+    }
 }
 
 void FramePlacer::examine(Pending pending) {
@@ -152,9 +164,9 @@ void FramePlacer::examine(Pending pending) {
     const FrameWitness& frame = pending.frame;
     const Sight sight = frame.whole ? code_.look(counter, frame.summary) : Sight::silent;
     pending.optical = sight;
-    if (sight == Sight::agrees) code_.learn(counter, frame.summary);
+    if (sight >= Sight::agrees) code_.learn(counter, frame.summary);
     waiting_.push_back(std::move(pending));
-    if (sight == Sight::agrees) {
+    if (sight == Sight::proves) {
         accept_waiting();
         proved_ = true;
     } else if (sight == Sight::disagrees) {
@@ -183,6 +195,8 @@ void FramePlacer::end_stretch() {
 
 void FramePlacer::accept_waiting() {
     for (const Pending& pending : waiting_) {
+        if (pending.frame.whole && code_.kind_at(counter_of(pending)) == SlotKind::basis)
+            code_.learn(counter_of(pending), pending.frame.summary);
         Placement placement{pending.frame.arrival, counter_of(pending), pending.frame.whole, "", pending.optical};
         if (!pending.frame.whole) placement.why = "its size or format is not the stage's";
         placements_.push_back(std::move(placement));

@@ -5,9 +5,9 @@
 // Method. Frames in camera order whose times lie on one grid of trigger periods form a *stretch*: one camera clock, whose
 // place among the triggers is one unknown number. The optical code gives it: the stretch is *locked* when exactly one
 // number fits every tracking, matte and dark frame seen. Within a stretch, frames whose ids step as their times do form
-// a *run*. Frames are accepted when the next landmark (tracking, matte, dark) of their run looks as it should, or the
-// run ends after a landmark that did. A landmark that does not look so takes down every frame since the last one that
-// did: something shifted in between.
+// a *run*. Frames are accepted when the next landmark of their run proves its slot (capture/optical_code.hpp), or the run
+// ends after one that did. A landmark that does not look as it should takes down every frame since the last proof:
+// something shifted in between.
 #pragma once
 
 #include <cstdint>
@@ -78,6 +78,7 @@ class FramePlacer {
     void end_run();
     void place(Pending pending);
     void try_lock();
+    void give_up_oldest(size_t count, const std::string& why);
     void examine(Pending pending);
     void accept_waiting();
     void refuse_waiting(const std::string& why);
