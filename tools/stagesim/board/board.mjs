@@ -27,6 +27,7 @@ async function main() {
   const board = new Board(image, {
     naive: options.naive,
     seed: options.seed,
+    uniqueId: options.boardId,
     injections: options.inject,
     log,
     onEdge: (tick, levels) => {

@@ -26,6 +26,7 @@ export class Board {
    * @param {object} options
    * @param {boolean} options.naive
    * @param {number} options.seed
+   * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
@@ -68,7 +69,7 @@ export class Board {
       this.#injectDue();
       const faults = this.#injections.map(({ tick }) => tick);
       const until = Math.min(end, ...faults) - this.#epoch;
-      this.#parts.lockstep.run(until, () => this.#resetCause !== null || this.#triggerFaultDue);
+      this.#parts.lockstep.run(until);
       if (this.#resetCause !== null) this.reset(this.#resetCause);
     }
   }
@@ -101,9 +102,9 @@ export class Board {
     const seed = this.#options.seed * 0x10000 + this.#boots++;
     const onWatchdog = () => {
       this.#resetCause = Cause.WATCHDOG;
-      this.chip.core.waiting = false; // so that the lock step comes back at once
+      this.#parts.lockstep.stop();
     };
-    const start = { cause, reason, scratch, seed, onWatchdog };
+    const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
     this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & PIN_MASK);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
@@ -112,13 +113,12 @@ export class Board {
 
   #edge(tick, levels) {
     if (levels === this.#levels) return;
-    if (levels & ~this.#levels & TRIGGER_MASK) this.#triggers++;
+    if (levels & ~this.#levels & TRIGGER_MASK) {
+      this.#triggers++;
+      if (this.#injections.some(({ trigger }) => trigger <= this.#triggers)) this.#parts.lockstep.stop();
+    }
     this.#levels = levels;
     this.#options.onEdge(tick, levels);
-  }
-
-  get #triggerFaultDue() {
-    return this.#injections.some(({ trigger }) => trigger <= this.#triggers);
   }
 
   #injectDue() {

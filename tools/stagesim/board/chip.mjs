@@ -2,6 +2,7 @@
 // One RP2040 from a reset to the next: rp2040js with the parts that time or the program would notice put right.
 import { RP2040 } from 'rp2040js';
 import { correctDma } from './dma.mjs';
+import { attachFlash } from './flash.mjs';
 import { Lockstep } from './lockstep.mjs';
 import { Pads } from './pads.mjs';
 import { Pio } from './pio.mjs';
@@ -15,7 +16,8 @@ const USB_PAGE = 0x50110;
 /**
  * Cycles are those of clk_sys and count from the reset; one is 8 ns from the first on, as if the program found its
  * 125 MHz already running. Both cores' flash and SRAM answer without wait states, and there is one core.
- * @param {{naive?: boolean, start: object, logger: object}} options `start` as correctSystem takes it
+ * @param {{naive?: boolean, start: object, logger: object}} options `start` as correctSystem takes it, and the flash
+ *   chip's `uniqueId`
  */
 export function buildChip({ naive = false, start, logger }) {
   const time = { cycle: 0 };
@@ -31,6 +33,7 @@ export function buildChip({ naive = false, start, logger }) {
   correctProcessor(chip);
   correctDma(chip);
   correctSystem(chip, start);
+  attachFlash(chip, start.uniqueId);
   pads.attach(chip);
   return { chip, pads, time, lockstep: new Lockstep(chip, pads, time, naive) };
 }

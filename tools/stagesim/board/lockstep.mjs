@@ -6,15 +6,15 @@ import { runInstruction } from './processor.mjs';
 const CYCLE_NS = 8;
 
 /**
- * In one cycle first the timers and DMA transfers that fall due act, then the PIO machines; the processor's
- * instruction acts before both in the first of its cycles. What one part does to another is seen from the next step
- * of the other on, the same with and without jumps.
+ * In one cycle first the timers and DMA transfers that fall due act, then the processor's instruction if one begins,
+ * then the PIO machines: an order, the same with and without jumps, for what hardware does at once.
  */
 export class Lockstep {
   #chip;
   #pads;
   #time;
   #naive;
+  #stopped = false;
 
   /**
    * @param {import('rp2040js').RP2040} chip
@@ -32,11 +32,17 @@ export class Lockstep {
     correctClock(chip.clock);
   }
 
-  /** Runs until `end`, or at most one instruction past it. Stops early when `stop()` becomes true. */
-  run(end, stop) {
+  /** Makes run() return at the end of this cycle. */
+  stop() {
+    this.#stopped = true;
+  }
+
+  /** Runs until `end`, or at most one instruction past it, or until stop() is called from within. */
+  run(end) {
     const { core } = this.#chip;
     const time = this.#time;
-    while (time.cycle < end && !stop()) {
+    this.#stopped = false;
+    while (time.cycle < end && !this.#stopped) {
       if (core.waiting) {
         this.#advance(end, true);
       } else {
@@ -60,30 +66,18 @@ export class Lockstep {
   }
 
   #advance(target, untilAwake) {
-    const { core, clock, pio } = this.#chip;
+    const { core, clock } = this.#chip;
+    const [pio0, pio1] = this.#chip.pio;
     const time = this.#time;
-    while (time.cycle < target) {
+    while (time.cycle < target && !this.#stopped) {
+      if (pio0.due <= time.cycle) pio0.step(time.cycle);
+      if (pio1.due <= time.cycle) pio1.step(time.cycle);
+      if (pio0.pinsChanged || pio1.pinsChanged) this.#pads.update(time.cycle + 1);
+      const next = this.#naive ? 0 : Math.min(pio0.due, pio1.due, this.nextAlarmCycle, target);
+      time.cycle = Math.max(next, time.cycle + 1);
       clock.tick(time.cycle * CYCLE_NS - clock.nanosCounter);
       if (untilAwake && !core.waiting) return;
-      if (pio[0].due <= time.cycle) pio[0].step(time.cycle);
-      if (pio[1].due <= time.cycle) pio[1].step(time.cycle);
-      if (pio[0].pinsChanged || pio[1].pinsChanged) this.#pads.update(time.cycle + 1);
-      time.cycle = this.#naive ? time.cycle + 1 : this.#nextCycle(target);
-      clock.nanosCounter = Math.max(clock.nanosCounter, Math.min(time.cycle * CYCLE_NS, this.#alarmNanos()));
-      if (untilAwake && !core.waiting) return;
     }
-  }
-
-  /** The next cycle in which something may happen, but not past `target`. */
-  #nextCycle(target) {
-    const { pio } = this.#chip;
-    const next = Math.min(pio[0].due, pio[1].due, this.nextAlarmCycle, target);
-    return Math.max(next, this.#time.cycle + 1);
-  }
-
-  #alarmNanos() {
-    const { nextAlarm } = this.#chip.clock;
-    return nextAlarm === null ? Infinity : nextAlarm.nanos;
   }
 }
 

@@ -17,6 +17,7 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --naive             step every cycle: slow, for checking the fast way
   --cycles-limit N    end after N ticks of 8 ns
   --seed N            of the chip's random bits (default 1)
+  --board-id HEX      the flash chip's unique number, 16 digits
   --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; WHEN is a tick, or trigger:N for the
                       N-th rise of any trigger; may be given several times
   --stats             print ticks, speed and dropped lines as JSON at the end
@@ -36,6 +37,7 @@ export function parseOptions(args) {
       options: {
         image: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
+        'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] }, stats: flag, help: flag,
       },
     }));
@@ -52,8 +54,14 @@ export function parseOptions(args) {
     chainBits,
     seed: integer('--seed', values.seed, 0),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
+    boardId: identity(values['board-id']),
     inject: values.inject.map(parseInjection),
   };
+}
+
+function identity(text) {
+  if (!/^[0-9a-f]{16}$/i.test(text)) throw new Error(`--board-id ${text}: not 16 hex digits`);
+  return Uint8Array.from(Buffer.from(text, 'hex'));
 }
 
 function integer(name, text, least) {

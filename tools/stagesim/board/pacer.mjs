@@ -52,7 +52,9 @@ export class Pacer {
   get statistics() {
     const ticks = this.#board.tick - this.#startTick;
     const running_s = Number(this.#running_ns) / 1e9;
-    return { ticks, running_s, mcycles_per_s: ticks / 1e6 / running_s, wall_lag_max_us: this.#lag_ns / 1000 };
+    const { user, system } = process.cpuUsage();
+    return { ticks, running_s, mcycles_per_s: ticks / 1e6 / running_s, mcycles_per_cpu_s: ticks / (user + system),
+             wall_lag_max_us: this.#lag_ns / 1000 };
   }
 
   /** Runs until stopped or out of ticks. */

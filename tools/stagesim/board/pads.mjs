@@ -71,10 +71,11 @@ export class Pads {
     return (synchronised & ~bypass) | (this.#inputsAt(cycle) & bypass);
   }
 
-  /** True if the synchroniser holds no change of `gpio` that is yet to be seen in `cycle`. */
+  /** True if the synchroniser holds no change of `gpio` that is yet to be seen after `cycle`. */
   settled(gpio, cycle) {
-    const change = this.#history[0].inputs ^ this.#inputsAt(cycle - SYNCHRONISER_CYCLES);
-    return ((change >> gpio) & 1) === 0;
+    const seen = this.#inputsAt(cycle - SYNCHRONISER_CYCLES);
+    return this.#history.every(({ from, inputs }) =>
+      from <= cycle - SYNCHRONISER_CYCLES || (((inputs ^ seen) >> gpio) & 1) === 0);
   }
 
   #inputsAt(cycle) {
@@ -87,14 +88,16 @@ export class Pads {
   /** Works out the pads' levels from `cycle` on. Call after anything that drives them has changed. */
   update(cycle) {
     const { pio, sio } = this.#chip;
-    const { sio: bySio, pio0, pio1 } = this.#sources;
-    pio[0].pinsChanged = false;
-    pio[1].pinsChanged = false;
-    let out = (pio[0].pinValues & pio0) | (pio[1].pinValues & pio1) | (sio.gpioValue & bySio);
-    let driven = (pio[0].pinDirections & pio0) | (pio[1].pinDirections & pio1) | (sio.gpioOutputEnable & bySio);
-    const { invert, low, high, enable, disable } = this.#overrides;
-    out = ((out ^ invert) & ~low) | high;
-    driven = (driven | enable) & ~disable;
+    const [pio0, pio1] = pio;
+    const sources = this.#sources;
+    const overrides = this.#overrides;
+    pio0.pinsChanged = false;
+    pio1.pinsChanged = false;
+    let out = (pio0.pinValues & sources.pio0) | (pio1.pinValues & sources.pio1) | (sio.gpioValue & sources.sio);
+    let driven = (pio0.pinDirections & sources.pio0) | (pio1.pinDirections & sources.pio1) |
+      (sio.gpioOutputEnable & sources.sio);
+    out = ((out ^ overrides.invert) & ~overrides.low) | overrides.high;
+    driven = (driven | overrides.enable) & ~overrides.disable;
     const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
     const levels = (out & driven) | (idle & ~driven);
     const inputs = levels & this.#enabledInputs;
@@ -110,17 +113,23 @@ export class Pads {
     if (this.#history[0].from === cycle) {
       this.#history[0].inputs = inputs; // a second change in one cycle
     } else {
-      const oldest = this.#history.pop();
+      const history = this.#history;
+      const oldest = history[3];
+      history[3] = history[2];
+      history[2] = history[1];
+      history[1] = history[0];
+      history[0] = oldest;
       oldest.from = cycle;
       oldest.inputs = inputs;
-      this.#history.unshift(oldest);
     }
     for (const pio of this.#chip.pio) {
-      if (changed & pio.syncBypass) pio.inputsChanged(changed & pio.syncBypass, cycle);
-      if (changed & ~pio.syncBypass) pio.inputsChanged(changed & ~pio.syncBypass, cycle + SYNCHRONISER_CYCLES);
+      const early = changed & pio.syncBypass;
+      if (early) pio.inputsChanged(early, cycle);
+      if (early !== changed) pio.inputsChanged(changed & ~early, cycle + SYNCHRONISER_CYCLES);
     }
-    for (const pin of this.#chip.gpio) {
-      if (pin.irqEnableMask && (changed >> pin.index) & 1) pin.setInputValue(((inputs >> pin.index) & 1) === 1);
+    for (let rest = changed; rest !== 0; rest &= rest - 1) {
+      const pin = this.#chip.gpio[31 - Math.clz32(rest & -rest)];
+      if (pin.irqEnableMask) pin.setInputValue(((inputs >> pin.index) & 1) === 1);
     }
   }
 

@@ -2,7 +2,7 @@
 // One PIO block: registers, instruction memory, flags and interrupts around four state machines
 // (RP2040 datasheet 3.5 and 3.7). Takes the place of rp2040js' own model, whose time is not the chip's.
 import { BasePeripheral } from 'rp2040js';
-import { PioMachine } from './pio_machine.mjs';
+import { PioMachine, rotate } from './pio_machine.mjs';
 import { Stall } from './pio_stall.mjs';
 
 const NEVER = Infinity;
@@ -73,8 +73,9 @@ export class Pio extends BasePeripheral {
   }
 
   inputsChanged(changed, cycle) {
-    for (const machine of this.machines) machine.inputsChanged(changed, cycle);
-    this.#reschedule();
+    for (const machine of this.machines) {
+      if (machine.inputsChanged(changed, cycle)) this.due = Math.min(this.due, machine.due);
+    }
   }
 
   get quiet() {
@@ -103,6 +104,11 @@ export class Pio extends BasePeripheral {
     if (directions === this.pinDirections) return;
     this.pinDirections = directions;
     this.pinsChanged = true;
+  }
+
+  /** Whether another machine than `machine` may drive some of `pins`, which then has to assert them all the time. */
+  sharesPins(machine, pins) {
+    return this.machines.some((other) => other !== machine && (other.drivenPins & pins) !== 0);
   }
 
   flagSet(flag) {
@@ -355,7 +361,7 @@ export class Pio extends BasePeripheral {
   }
 
   #writeMachine(machine, place, value, cycle) {
-    machine.settle(cycle);
+    for (const each of this.machines) each.settle(cycle); // they may share the pins that change hands here
     switch (place) {
       case 0x00:
         machine.clock.setRegister(value, cycle);
@@ -378,8 +384,4 @@ export class Pio extends BasePeripheral {
         machine.setPinCtrl(value);
     }
   }
-}
-
-function rotate(value, places) {
-  return places === 0 ? value : (value << places) | (value >>> (32 - places));
 }

@@ -75,6 +75,7 @@ function wait(machine, low, cycle) {
     return Stall.NONE;
   }
   const gpio = source === 0 ? index : (index + machine.inBase) & 0x1f;
+  machine.waitPin = gpio;
   return machine.block.pads.seen(gpio, cycle, machine.block.syncBypass) === high ? Stall.NONE : Stall.PIN;
 }
 

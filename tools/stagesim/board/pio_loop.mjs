@@ -15,7 +15,7 @@ const NOP = 0xa042; // mov y, y: how assemblers write `nop`
  * @property {number} xPerPass
  * @property {number} yPerPass
  * @property {boolean} watchesPin
- * @property {number} side      bits 12:8 that side-set takes, the same in every instruction
+ * @property {number | null} side what it puts on the side-set pins, null if it leaves them alone
  */
 
 /**
@@ -45,10 +45,11 @@ export function findLoop(program, pc) {
   return loop;
 }
 
+/** What an instruction puts on the side-set pins, null if it leaves them alone. */
 function sideOf(program, opcode) {
-  const delayBits = 5 - program.sideBits;
-  const optedOut = program.sideOptional && (opcode & 0x1000) === 0;
-  return optedOut ? 0 : ((opcode >> 8) & 0x1f) >> delayBits;
+  if (program.sideBits === 0) return null;
+  if (program.sideOptional && (opcode & 0x1000) === 0) return null;
+  return ((opcode >> 8) & 0x1f) >> (5 - program.sideBits);
 }
 
 /** Whether `opcode` jumps; null if it is neither a jump with a known outcome nor a nop. */

@@ -42,6 +42,7 @@ export class PioMachine {
     this.tick = 0; // of the machine's clock, in which it acts next
     this.delayLeft = 0; // ticks; naive stepping counts delays down, otherwise `tick` already lies behind them
     this.stall = Stall.NONE;
+    this.waitPin = 0; // while stalled on a pin
     this.latch = NO_LATCH; // instruction from OUT EXEC, MOV EXEC or a stalled SMx_INSTR write
     this.jumped = false;
     this.irqRaised = false; // a stalled `irq wait` has set its flag
@@ -100,6 +101,15 @@ export class PioMachine {
     this.loopCache.clear();
   }
 
+  /** Pins of its side-set, and all that it can drive. */
+  get sidePins() {
+    return pinMask(this.sideBase, this.sideBits - (this.sideOptional ? 1 : 0));
+  }
+
+  get drivenPins() {
+    return this.sidePins | pinMask(this.setBase, this.setCount) | pinMask(this.outBase, this.outCount);
+  }
+
   get execStalled() {
     return this.latch !== NO_LATCH && this.stall !== Stall.NONE;
   }
@@ -156,12 +166,17 @@ export class PioMachine {
     }
   }
 
-  /** Input pins in `changed` look different from `cycle` on. */
+  /** Input pins in `changed` look different from `cycle` on. Returns whether this machine is watching one of them. */
   inputsChanged(changed, cycle) {
-    this.wake(Stall.PIN, cycle);
+    if (this.stall === Stall.PIN && (changed >>> this.waitPin) & 1) {
+      this.wake(Stall.PIN, cycle);
+      return true;
+    }
     if (this.loop !== null && this.loop.watchesPin && (changed >>> this.jmpPin) & 1) {
       this.due = Math.min(this.due, this.clock.cycleOf(this.clock.tickFrom(cycle)));
+      return true;
     }
+    return false;
   }
 
   /** True if nothing but an event from outside, or the end of a wait for a pin, can make this machine act. */
@@ -194,7 +209,7 @@ export class PioMachine {
     const xPasses = loop.xPerPass ? Math.floor(this.x / loop.xPerPass) : NEVER;
     const yPasses = loop.yPerPass ? Math.floor(this.y / loop.yPerPass) : NEVER;
     const passes = Math.min(xPasses, yPasses);
-    if (passes === 0) return;
+    if (passes === 0 || (loop.side !== null && this.block.sharesPins(this, this.sidePins))) return;
     this.loop = loop;
     this.loopTick = this.tick;
     this.due = passes === NEVER ? NEVER : this.clock.cycleOf(this.tick + passes * loop.passTicks);
@@ -243,6 +258,7 @@ export class PioMachine {
   force(opcode, cycle) {
     this.settle(cycle);
     this.latch = opcode & 0xffff;
+    this.stall = Stall.NONE;
     this.irqRaised = false;
     this.delayLeft = 0;
     this.#runNext(cycle);
@@ -254,12 +270,12 @@ export class PioMachine {
     this.latch = NO_LATCH;
     this.jumped = false;
     const from = this.pc;
+    const begins = this.stall === Stall.NONE;
     this.stall = execute(this, opcode, cycle);
-    this.#side(opcode);
+    if (begins) this.#side(opcode);
     if (this.stall !== Stall.NONE) {
       if (latched) this.latch = opcode;
-      // An OUT that has just refilled the OSR needs one more cycle; other stalls end by an event.
-      const retries = this.naive || (this.stall === Stall.TX && this.osrCount === 0 && this.autopull);
+      const retries = this.naive || this.#endsByItself(cycle);
       this.tick = this.clock.tickFrom(cycle + 1);
       this.due = retries ? this.clock.cycleOf(this.tick) : NEVER;
       return;
@@ -270,6 +286,12 @@ export class PioMachine {
     // The delay of an instruction that fills the latch is ignored (datasheet 3.4.5.2).
     const delay = this.latch !== NO_LATCH ? 0 : (opcode >> 8) & ((1 << (5 - this.sideBits)) - 1);
     this.#scheduleAfter(cycle, delay, latched ? NO_ADDRESS : from);
+  }
+
+  /** A stall ends by an event, except of an OUT that has just refilled the OSR, or if the pin's change is on its way. */
+  #endsByItself(cycle) {
+    if (this.stall === Stall.TX) return this.autopull && this.osrCount === 0;
+    return this.stall === Stall.PIN && !this.block.pads.settled(this.waitPin, cycle);
   }
 
   #scheduleAfter(cycle, delay, from) {
@@ -308,4 +330,13 @@ export class PioMachine {
   refill() {
     if (this.autopull && this.osrCount >= this.pullThreshold && !this.tx.empty) this.takeTx();
   }
+}
+
+function pinMask(base, count) {
+  return count <= 0 ? 0 : rotate(count >= 32 ? 0xffffffff : (1 << count) - 1, base);
+}
+
+/** A 32-bit word rotated left: pin mappings wrap from GPIO 31 to 0. */
+export function rotate(value, places) {
+  return places === 0 ? value : (value << places) | (value >>> (32 - places));
 }

@@ -11,7 +11,8 @@ const BRANCH_TO_SELF = 0xe7fe;
 export class Bench {
   constructor({ naive = false } = {}) {
     const logger = { debug() {}, info() {}, warn() {}, error(name, text) { throw new Error(`${name}: ${text}`); } };
-    const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, onWatchdog: () => {} };
+    const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, onWatchdog: () => {},
+                    uniqueId: new Uint8Array(8) };
     Object.assign(this, buildChip({ naive, start, logger }));
     this.edges = [];
     this.pads.onChange = (cycle, levels) => this.edges.push([cycle, levels]);
@@ -28,7 +29,7 @@ export class Bench {
 
   run(cycles) {
     const end = this.time.cycle + cycles;
-    this.lockstep.run(end, () => false);
+    this.lockstep.run(end);
   }
 
   write(address, value) {

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// Durable files with plain system calls: the order of write, fsync, rename, fsync of the directory is the point.
+#include "archive/disk.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <vector>
+
+namespace ols {
+
+Error disk_error(const std::string& action, const std::string& path, int error_number) {
+    std::string remedy;
+    if (error_number == ENOSPC || error_number == EDQUOT) remedy = ": free space there or choose another disk";
+    if (error_number == EFBIG) remedy = ": the file system or a limit (ulimit -f) allows no larger file";
+    return fail("cannot " + action + " '" + path + "': " + std::strerror(error_number) + remedy);
+}
+
+Status sync_directory(const std::string& path) {
+    const std::string name = path.empty() ? "." : path;
+    const int fd = ::open(name.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return disk_error("open directory", name, errno);
+    const int error = fsync(fd) == 0 ? 0 : errno;
+    ::close(fd);
+    // Some network and FUSE file systems cannot sync directories; there is nothing more to be had from those.
+    if (error != 0 && error != EINVAL) return disk_error("sync directory", name, error);
+    return Done{};
+}
+
+Status rename_durably(const std::string& from, const std::string& to) {
+    if (rename(from.c_str(), to.c_str()) != 0) return disk_error("rename a finished file to", to, errno);
+    return sync_directory(std::filesystem::path(to).parent_path());
+}
+
+Status write_file_durably(const std::string& path, const std::string& text) {
+    const std::string temporary = path + unfinished_suffix;
+    const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd < 0) return disk_error("write", path, errno);
+    int error = 0;
+    for (size_t done = 0; done < text.size() && error == 0;) {
+        const ssize_t n = ::write(fd, text.data() + done, text.size() - done);
+        if (n > 0)
+            done += size_t(n);
+        else if (n < 0 && errno != EINTR)
+            error = errno;
+    }
+    if (error == 0 && fsync(fd) != 0) error = errno;
+    if (::close(fd) != 0 && error == 0) error = errno;
+    if (error != 0) {
+        unlink(temporary.c_str());
+        return disk_error("write", path, error);
+    }
+    return rename_durably(temporary, path);
+}
+
+Checksum checksum_text(const std::string& text) {
+    return {text.size(), uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size()))};
+}
+
+Result<Checksum> checksum_file(const std::string& path) {
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return disk_error("read", path, errno);
+    std::vector<Bytef> buffer(1 << 20);
+    Checksum sum;
+    ssize_t n;
+    while ((n = ::read(fd, buffer.data(), buffer.size())) != 0) {
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) break;
+        sum.bytes += uint64_t(n);
+        sum.crc32 = uint32_t(crc32_z(sum.crc32, buffer.data(), size_t(n)));
+    }
+    const int error = n < 0 ? errno : 0;
+    ::close(fd);
+    if (error != 0) return disk_error("read", path, error);
+    return sum;
+}
+
+}  // namespace ols
