@@ -139,7 +139,7 @@ void FramePlacer::try_lock() {
     first_counter_ = found.counter;
     // Landmarks from last to first, so that the first of each kind is what the next one is compared with; then what basis
     // slots can be taken for.
-    const auto learn_basis = [&](bool basis, const Pending& pending) {
+    const auto learn = [&](bool basis, const Pending& pending) {
         const uint64_t counter = counter_of(pending);
         if (pending.frame.whole && (code_.kind_at(counter) == SlotKind::basis) == basis)
             code_.learn(counter, pending.frame.summary);
