@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// rf: what is done with reflectance functions after the take.
+#include "verbs.hpp"
+
+int main(int argc, char** argv) {
+    CLI::App app{"Reads, checks, exports and relights archives of reflectance functions (take.rfa)."};
+    app.name("rf");
+    app.footer("Example: rf info take.rfa\nExit codes: 0 done; 1 an error or a problem, named; else wrong arguments.");
+    app.require_subcommand(1);
+    int exit_code = 0;
+    ols::add_info_verb(app, exit_code);
+    ols::add_verify_verb(app, exit_code);
+    ols::add_export_verb(app, exit_code);
+    CLI11_PARSE(app, argc, argv);
+    return exit_code;
+}

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// rf verify: which targets are as they were written, and what is wrong with the rest.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "archive/archive.hpp"
+#include "verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+nlohmann::json report_of(const ArchiveReader& archive, const Verification& found) {
+    nlohmann::json missing = nlohmann::json::array();
+    for (const auto& entry : archive.targets())
+        if (entry.file.empty())
+            missing.push_back({{"camera", entry.camera}, {"index", entry.index}, {"why", entry.why_missing}});
+    return {{"finished", archive.finished()},
+            {"ok", found.problems.empty()},
+            {"intact", found.intact},
+            {"missing", missing},
+            {"problems", found.problems}};
+}
+
+// The number of problems.
+Result<size_t> run(const std::string& path, bool as_json) {
+    const auto archive = ArchiveReader::open(path);
+    if (!archive) return archive.error();
+    const Verification found = archive->verify();
+    if (as_json) {
+        fmt::print("{}\n", report_of(*archive, found).dump(1));
+        return found.problems.size();
+    }
+    for (const auto& file : found.intact) fmt::print("ok       {}\n", file);
+    for (const auto& entry : archive->targets())
+        if (entry.file.empty())
+            fmt::print("missing  camera {} target {}: {}\n", entry.camera, entry.index, entry.why_missing);
+    for (const auto& problem : found.problems) fmt::print("problem  {}\n", problem);
+    fmt::print("{}: {} targets intact, {} problems\n", path, found.intact.size(), found.problems.size());
+    return found.problems.size();
+}
+
+}  // namespace
+
+void add_verify_verb(CLI::App& app, int& exit_code) {
+    struct Options {
+        std::string archive;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("verify", "check every file of an archive against its journal");
+    verb->footer(
+        "Example: rf verify take.rfa\n"
+        "Exit code 0: finished, and every file is as it was written. 1: problems, each named; targets listed as ok are "
+        "whole even so. Targets that the recording itself noted as missing are no problem of the archive.");
+    verb->add_option("archive", options->archive, "take.rfa")->required();
+    verb->add_flag("--json", options->json, "print JSON");
+    verb->callback([options, &exit_code] {
+        const auto problems = run(options->archive, options->json);
+        if (!problems) fmt::print(stderr, "rf verify: {}\n", problems.error().message);
+        if (!problems || *problems > 0) exit_code = 1;
+    });
+}
+
+}  // namespace ols
