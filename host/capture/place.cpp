@@ -27,6 +27,7 @@ FramePlacer::FramePlacer(const Sequence& sequence, const IdentifyOptions& option
       code_(kinds_of(sequence)) {}
 
 void FramePlacer::add(FrameWitness frame) {
+    if (frame.arrival < bound_arrivals_) frame.fired_before = bound_fired_;
     const FrameWitness copy = frame;
     switch (window_.add(std::move(frame))) {
         case ReorderWindow::Arrival::duplicate:
@@ -46,6 +47,8 @@ void FramePlacer::bound(uint64_t arrivals, uint64_t fired) {
     window_.for_each(tell);
     if (stray_) tell(*stray_);
     for (Pending& pending : unlocked_) tell(pending.frame);
+    bound_arrivals_ = arrivals;
+    bound_fired_ = fired;
 }
 
 void FramePlacer::end() {
@@ -56,7 +59,7 @@ void FramePlacer::end() {
 }
 
 void FramePlacer::process(FrameWitness frame) {
-    if (!clock_) return begin_stretch(std::move(frame), "before the camera's first frame");
+    if (!grid_) return begin_stretch(std::move(frame), "before the camera's first frame");
     if (append(frame)) {
         if (stray_) refuse(*stray_, "its time fits no trigger");
         stray_.reset();
@@ -64,8 +67,8 @@ void FramePlacer::process(FrameWitness frame) {
     }
     // Two frames in a row that fit each other but not the grid: the camera's clock was set anew.
     if (stray_ && stray_->epoch == frame.epoch) {
-        const CameraClock stray_clock(period_ns_, stray_->stamp.timestamp_ns, code_.cycle_slots());
-        const auto steps = stray_clock.steps_to(frame.stamp.timestamp_ns);
+        const TriggerGrid stray_grid(period_ns_, stray_->stamp.timestamp_ns, code_.cycle_slots());
+        const auto steps = stray_grid.steps_to(frame.stamp.timestamp_ns);
         if (steps && *steps == frame.stamp.frame_id - stray_->stamp.frame_id) {
             end_stretch();
             ++camera_restarts_;
@@ -80,7 +83,7 @@ void FramePlacer::process(FrameWitness frame) {
 }
 
 void FramePlacer::begin_stretch(FrameWitness frame, const std::string& gap) {
-    clock_.emplace(period_ns_, frame.stamp.timestamp_ns, code_.cycle_slots());
+    grid_.emplace(period_ns_, frame.stamp.timestamp_ns, code_.cycle_slots());
     last_stamp_ = frame.stamp;
     last_epoch_ = frame.epoch;
     last_position_ = 0;
@@ -91,10 +94,10 @@ void FramePlacer::begin_stretch(FrameWitness frame, const std::string& gap) {
 
 // Adds a frame to the stretch if its time lies on the grid and the sequence has a trigger there.
 bool FramePlacer::append(FrameWitness& frame) {
-    const auto steps = clock_->steps_to(frame.stamp.timestamp_ns);
+    const auto steps = grid_->steps_to(frame.stamp.timestamp_ns);
     const uint64_t base = locked_ ? first_counter_ : next_counter_;
     if (!steps || base + last_position_ + *steps >= trigger_count_) return false;
-    clock_->advance(*steps, frame.stamp.timestamp_ns);
+    grid_->advance(*steps, frame.stamp.timestamp_ns);
     const bool restarted = frame.epoch != last_epoch_;
     const uint64_t id_steps = frame.stamp.frame_id - last_stamp_.frame_id;
     std::string gap;
@@ -166,6 +169,7 @@ void FramePlacer::examine(Pending pending) {
     pending.optical = sight;
     if (sight >= Sight::agrees) code_.learn(counter, frame.summary);
     waiting_.push_back(std::move(pending));
+    if (waiting_.size() > options_.pending_max) refuse_waiting("no landmark proved it before memory ran out");
     if (sight == Sight::proves) {
         accept_waiting();
         proved_ = true;
@@ -189,7 +193,7 @@ void FramePlacer::end_stretch() {
     if (locked_) end_run();
     for (const Pending& pending : unlocked_) refuse(pending.frame, "its place in the cycle could not be proved");
     unlocked_.clear();
-    clock_.reset();
+    grid_.reset();
     locked_ = false;
 }
 
@@ -222,9 +226,14 @@ uint64_t FramePlacer::lowest_open() const {
     return waiting_.empty() ? next_counter_ : counter_of(waiting_.front());
 }
 
+std::optional<uint64_t> FramePlacer::time_of_ns(uint64_t counter) const {
+    if (!locked_) return std::nullopt;
+    return grid_->time_after_ns(int64_t(counter) - int64_t(first_counter_ + last_position_));
+}
+
 std::optional<double> FramePlacer::drift_ppm() const {
     if (!locked_) return std::nullopt;
-    return clock_->drift_ppm();
+    return grid_->drift_ppm();
 }
 
 }  // namespace ols

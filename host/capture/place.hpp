@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "capture/camera_clock.hpp"
 #include "capture/optical_code.hpp"
 #include "capture/reorder.hpp"
+#include "capture/trigger_grid.hpp"
 #include "stage/sequence.hpp"
 
 namespace ols {
@@ -58,6 +58,9 @@ class FramePlacer {
     uint64_t lowest_open() const;
 
     bool locked() const { return locked_; }
+
+    // When a trigger is due on the camera's clock; nothing before the lock.
+    std::optional<uint64_t> time_of_ns(uint64_t counter) const;
     std::optional<double> drift_ppm() const;  // of the camera's clock against the board's, when locked
     uint64_t duplicates() const { return duplicates_; }
     uint64_t camera_restarts() const { return camera_restarts_; }
@@ -91,12 +94,13 @@ class FramePlacer {
     const IdentifyOptions options_;
     ReorderWindow window_;
     OpticalCode code_;
-    uint64_t next_counter_ = 0;  // above every counter that a frame was placed at
+    uint64_t next_counter_ = 0;                      // above every counter that a frame was placed at
+    uint64_t bound_arrivals_ = 0, bound_fired_ = 0;  // the last bound, for frames that are still on their way here
     std::vector<Placement> placements_;
     uint64_t duplicates_ = 0, camera_restarts_ = 0;
 
     // The stretch.
-    std::optional<CameraClock> clock_;
+    std::optional<TriggerGrid> grid_;
     std::optional<FrameWitness> stray_;  // off the grid: a bad stamp, or the first of a new stretch
     CameraStamp last_stamp_;
     uint32_t last_epoch_ = 0;

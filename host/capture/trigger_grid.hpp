@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CameraClock: where on the grid of triggers a camera time lies. Triggers are evenly spaced; the camera's clock has an
+// TriggerGrid: where on the grid of triggers a camera time lies. Triggers are evenly spaced; the camera's clock has an
 // unknown offset and drifts.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace ols {
 
-class CameraClock {
+class TriggerGrid {
   public:
     // A twentieth of a period: hardware timestamps jitter by a microsecond or less, and 23 us of 463 still tell triggers
     // apart with room for the drift over a pause.
@@ -17,7 +17,7 @@ class CameraClock {
     static constexpr double drift_max = 1e-3;
 
     // `settle_triggers`: how far apart two frames must be before their times tell the drift better than not knowing it.
-    CameraClock(double nominal_period_ns, uint64_t first_time_ns, uint64_t settle_triggers)
+    TriggerGrid(double nominal_period_ns, uint64_t first_time_ns, uint64_t settle_triggers)
         : nominal_(nominal_period_ns),
           period_(nominal_period_ns),
           settle_(settle_triggers),
@@ -40,6 +40,9 @@ class CameraClock {
         const double measured = double(last_ns_ - first_ns_) / double(triggers_);
         if (std::abs(measured / nominal_ - 1) < drift_max) period_ = measured;
     }
+
+    // When the trigger `steps` after the last frame's is due; steps may be negative.
+    uint64_t time_after_ns(int64_t steps) const { return last_ns_ + uint64_t(std::llround(double(steps) * period_)); }
 
     double drift_ppm() const { return (period_ / nominal_ - 1) * 1e6; }
 
