@@ -74,7 +74,7 @@ def own_check(changes, slots):
     light = pulses(changes, "LIGHT_EN")
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong([w for _, w in words], slots)}
     report["triggers"] = report["triggers_expected"] = 0
-    errors, exposure_errors, dark = [0], [0], 0
+    errors, exposure_errors = [0], [0]
     for n, name in enumerate(TRIGGERS):
         found = pulses(changes, name)
         wanted = [slot for slot in slots if slot["trigger_mask"] >> n & 1]
@@ -83,7 +83,6 @@ def own_check(changes, slots):
         starts = [slot["start"] for slot in wanted]
         errors += [(b[0] - a[0]) - (t - s) for a, b, s, t in zip(found, found[1:], starts, starts[1:])]
         exposure_errors += [fall - rise - slot["exposure_ticks"] for (rise, fall), slot in zip(found, wanted)]
-        dark += sum(slot["kind"] == DARK for slot in wanted)
         if n == 0:
             lit = [pulse for pulse, slot in zip(found, wanted) if slot["kind"] != DARK]
             report["light_pulses"] = len(light)
@@ -98,22 +97,21 @@ def count_wrong(words, slots):
     return sum(word != slot["bits"] for word, slot in zip(words, slots)) + abs(len(words) - len(slots))
 
 
-def sigrok_check(path, slots, chain_bits):
-    """The same from sigrok's SPI and timing decoders, which know nothing of us."""
+def sigrok_check(path, slots):
+    """The same from sigrok's SPI and timing decoders, which know nothing of us; the chain must be whole bytes long."""
+    if len(slots[0]["bits"]) % 8:
+        return {"error": "the chain is not whole bytes long, which sigrok's SPI decoder needs"}
     if shutil.which("sigrok-cli") is None:
         return {"error": "sigrok-cli is not installed"}
     spi = "spi:clk=CLK:mosi=DATA:cs=LATCH:cs_polarity=active-low:wordsize=8"
     transfers = [line.split(":")[1].split() for line in decode(path, spi, "spi=mosi-transfer")]
     words = [[int(bit) for byte in line for bit in f"{int(byte, 16):08b}"] for line in transfers]
-    # After the last LATCH nothing more ends a transfer; bytes cannot show a chain that is not whole bytes long.
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong(words, slots)}
-    if chain_bits % 8:
-        report = {"shift_words_checked": 0, "shift_words_wrong": 0}
     wanted = [slot["start"] for slot in slots if slot["trigger_mask"] & 1]
     periods = [b - a for a, b in zip(wanted, wanted[1:])]
     found = [ticks_of(line) for line in decode(path, "timing:data=TRIG0:edge=rising", "timing=time")]
     report["triggers"] = len(found) + 1
-    off = [max(0, abs(ticks - period) - unit / 2) for (ticks, unit), period in zip(found, periods)]
+    off = [abs(ticks - period) if abs(ticks - period) > unit / 2 else 0 for (ticks, unit), period in zip(found, periods)]
     report["trigger_period_error_ticks"] = round(max(off, default=0), 3)
     return report
 
@@ -134,7 +132,7 @@ def ticks_of(line):
 def check(trace, program):
     slots = expected_slots(program)
     changes = read_vcd(trace)
-    report = {"own": own_check(changes, slots), "sigrok": sigrok_check(trace, slots, len(slots[0]["bits"]))}
+    report = {"own": own_check(changes, slots), "sigrok": sigrok_check(trace, slots)}
     own, sigrok = report["own"], report["sigrok"]
     report["trigger_period_error_ticks"] = max(own["trigger_period_error_ticks"],
                                                sigrok.get("trigger_period_error_ticks", float("inf")))

@@ -40,8 +40,10 @@ async function main() {
     },
     onUnplug: () => usb?.drop(),
   });
-  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage });
-  const usb = options.usb ? new UsbSocket(options.usb, () => board.usbHost, () => pacer.wake(), log) : null;
+  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage,
+                                   openSince: () => recorder?.openSince ?? Infinity });
+  const usb = options.usb ? new UsbSocket(options.usb, () => board.usbHost, () => pacer.wake(), log,
+    (connected) => stage?.send({ type: 'usb', connected })) : null;
   await usb?.listen();
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });

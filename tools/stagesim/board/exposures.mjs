@@ -23,6 +23,11 @@ export class ExposureRecorder {
     this.#emit = emit;
   }
 
+  /** The tick at which the oldest exposure still under way began, Infinity when none is. */
+  get openSince() {
+    return Math.min(...this.#open.map((exposure) => exposure?.rise ?? Infinity));
+  }
+
   /** @param {number} levels of all GPIOs from `tick` on */
   edge(tick, levels) {
     const before = this.#levels;

@@ -28,8 +28,14 @@ export class Pacer {
   #running_ns = 0n;
   #lag_ns = 0;
 
-  /** @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null}} options */
-  constructor(board, { pace, ticksLimit, stage }) {
+  #openSince;
+
+  /**
+   * @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null, openSince?: () => number}} options
+   *   openSince: the tick at which the oldest exposure still under way began, Infinity when none is
+   */
+  constructor(board, { pace, ticksLimit, stage, openSince = () => Infinity }) {
+    this.#openSince = openSince;
     this.#board = board;
     this.#pace = pace;
     this.#limit = ticksLimit;
@@ -74,7 +80,7 @@ export class Pacer {
     const begin = process.hrtime.bigint();
     board.run(Math.min(from + SLICE_TICKS, this.#limit));
     this.#running_ns += process.hrtime.bigint() - begin;
-    this.#stage?.send({ type: 'now', tick: board.tick });
+    this.#stage?.send({ type: 'now', tick: Math.min(board.tick, this.#openSince()) });
     const busy = !board.quiet || board.awakeCycles < awake || board.awakeCycles - awake > AWAKE_FRACTION * SLICE_TICKS;
     if (busy) this.#quietSince = null;
     else this.#quietSince ??= from;

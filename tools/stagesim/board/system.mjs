@@ -27,7 +27,11 @@ export function correctSystem(chip, start) {
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.reason = start.reason;
   watchdog.scratchData.set(start.scratch);
-  watchdog.onWatchdogTrigger = start.onWatchdog;
+  watchdog.onWatchdogTrigger = () => {
+    watchdog.timer.enable = false; // it bites once
+    watchdog.alarm.enable = false;
+    start.onWatchdog();
+  };
 }
 
 /** What a watchdog reset leaves for the next start (RP2040 datasheet 4.7.6: REASON and SCRATCH0..7). */

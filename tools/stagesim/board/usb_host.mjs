@@ -71,8 +71,9 @@ export class UsbHost {
     return this.#waiting.length > 0 || [...this.#queues.values()].some((queue) => queue.length > 0);
   }
 
+  /** A device that is plugged in sees an idle bus, and suspends, until the host has debounced the connection. */
   plug() {
-    this.#suspendAlarm.cancel();
+    if (!this.#suspendAlarm.scheduled) this.#suspendAlarm.schedule(SUSPEND_NS);
     this.#controller.setPowered(true);
     this.#state = 'searching';
     this.#deviceMayHaveChanged();
@@ -83,6 +84,7 @@ export class UsbHost {
     if (this.#state === 'unplugged') return;
     this.#lose('unplugged');
     this.#controller.setPowered(false);
+    this.#suspendAlarm.cancel();
     this.#suspendAlarm.schedule(SUSPEND_NS);
   }
 

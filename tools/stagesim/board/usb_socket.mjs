@@ -10,6 +10,7 @@ const HEADER_BYTES = 28;
 const REPLY_BYTES = 16;
 const PAYLOAD_LIMIT = 1 << 20;
 const TYPES = ['control', 'bulk', 'cancel'];
+const HANDOVER_MS = 200;
 
 export class UsbSocket {
   #server;
@@ -19,16 +20,19 @@ export class UsbSocket {
   #inFlight = new Map(); // tag -> handle of the host
   #host;
   #log;
+  #onClient;
 
   /**
    * @param {() => import('./usb_host.mjs').UsbHost} host the chip's at this moment
    * @param {() => void} onActivity called when something has come in
+   * @param {(connected: boolean) => void} onClient called when a client has come or gone
    */
-  constructor(path, host, onActivity, log) {
+  constructor(path, host, onActivity, log, onClient = () => {}) {
     this.#path = path;
     this.#host = host;
     this.#log = log;
     this.onActivity = onActivity;
+    this.#onClient = onClient;
     this.#server = createServer((socket) => this.#accept(socket));
   }
 
@@ -62,16 +66,25 @@ export class UsbSocket {
   }
 
   #accept(socket) {
+    socket.on('error', () => {}); // 'close' follows
     if (this.#client !== null) {
-      this.#log('usb: a second client was turned away');
-      socket.destroy();
+      // A client that reconnects may be seen before its old connection's end is.
+      this.#client.once('close', () => {
+        clearTimeout(turnAway);
+        this.#accept(socket);
+      });
+      const turnAway = setTimeout(() => {
+        this.#log('usb: a second client was turned away');
+        socket.destroy();
+      }, HANDOVER_MS);
       return;
     }
+    if (socket.destroyed) return;
     this.#client = socket;
+    this.#onClient(true);
     socket.on('data', (bytes) => {
       if (socket === this.#client) this.#receive(bytes);
     });
-    socket.on('error', () => {}); // 'close' follows
     socket.on('close', () => {
       if (socket !== this.#client) return;
       this.#forget();
@@ -83,6 +96,7 @@ export class UsbSocket {
   }
 
   #forget() {
+    if (this.#client !== null) this.#onClient(false);
     this.#client = null;
     this.#input = Buffer.alloc(0);
     this.#inFlight.clear();

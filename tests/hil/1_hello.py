@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+# The board says who it is, to friend and stranger.
+import re
+import subprocess
+import sys
+
+import pytest
+
+import wire
+from board import ROOT, BoardError
+
+HASH_TOOL = ROOT / "protocol/layout_hash.py"
+WIRE_H = ROOT / "protocol/wire.h"
+
+
+def layout_hash(header):
+    text = subprocess.run([sys.executable, HASH_TOOL, header], check=True, capture_output=True, text=True).stdout
+    return int(re.search(r"0x([0-9a-f]{16})", text).group(1), 16)
+
+
+def test_hello_tells_layout_chain_and_clock(emulated):
+    hello = emulated().plug().hello(layout_hash(WIRE_H))
+    assert hello["layout_hash"] == layout_hash(WIRE_H)
+    assert (hello["chain_bits"], hello["slots_max"], hello["tick_hz"]) == (176, 1024, 125_000_000)
+    assert hello["board_id"] == b"OLS-VIRT"
+
+
+def test_a_host_of_another_layout_still_learns_the_boards_hash_and_can_refuse(emulated, tmp_path):
+    changed = tmp_path / "wire.h"
+    changed.write_text(WIRE_H.read_text().replace("uint32_t exposure_ticks;", "uint64_t exposure_ticks;"))
+    theirs = layout_hash(changed)
+    hello = emulated().plug().hello(theirs)
+    assert hello["layout_hash"] == layout_hash(WIRE_H) != theirs
+
+
+def test_the_boot_nonce_differs_after_a_reset(emulated):
+    board = emulated("--inject", "reset@40000000")
+    link = board.plug()
+    before = link.hello(0)["boot_nonce"]
+    with pytest.raises(ConnectionError):
+        while True:
+            link.status()
+    after = board.plug().hello(0)["boot_nonce"]
+    assert before != after
+
+
+def test_an_unknown_message_is_refused_by_name(emulated):
+    with pytest.raises(BoardError, match="unknown message"):
+        emulated().plug().ask(0x55)
+
+
+def test_a_damaged_frame_is_skipped_and_the_next_one_answered(emulated):
+    link = emulated().plug()
+    damaged = bytearray(wire.frame(wire.STATUS, 7))
+    damaged[-1] ^= 1
+    assert link.usb.write(bytes(damaged)) == 0
+    assert link.status()["state"] == wire.IDLE

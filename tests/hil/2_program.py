@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+# The paper's cycle, played by the firmware: every edge of the trace and every exposure against the program.
+import json
+import subprocess
+import sys
+import threading
+
+import pytest
+
+import check_trace
+import wire
+from board import ROOT, BoardError
+from program import paper_program
+
+
+def hex_digits(bits):
+    return f"{int(''.join(map(str, bits)), 2):0{len(bits) // 4}x}"
+
+
+def play_to_the_end(board, program):
+    link = board.plug()
+    link.play(program)
+    status = link.wait_until([wire.DONE, wire.FAULT])
+    assert status["fault"] == 0, wire.FAULTS[status["fault"]]
+    return link
+
+
+def test_every_trigger_and_shift_word_of_two_cycles_is_right_by_two_checkers(emulated, tmp_path):
+    program = paper_program(cycles=2)
+    board = emulated(trace=True)
+    play_to_the_end(board, program)
+    board.stop()
+    (tmp_path / "program.json").write_text(json.dumps(program))
+    result = subprocess.run([sys.executable, ROOT / "tests/hil/check_trace.py", board.trace, tmp_path / "program.json"],
+                            capture_output=True, text=True)
+    report = json.loads(result.stdout)
+    assert result.returncode == 0 and report["right"], report
+    assert report["own"]["triggers"] == report["sigrok"]["triggers"] == 360
+    assert report["own"]["shift_words_checked"] == report["sigrok"]["shift_words_checked"] == 360
+    assert report["trigger_period_error_ticks"] == 0
+
+
+def test_the_checker_notices_a_trigger_moved_by_one_tick_and_a_wrong_lamp(emulated):
+    program = paper_program(cycles=1, slots=18)
+    board = emulated(trace=True)
+    play_to_the_end(board, program)
+    board.stop()
+    assert check_trace.check(board.trace, program)["right"]
+    wrong_lamp = json.loads(json.dumps(program))
+    wrong_lamp["slots"][5]["bits"][17] ^= 1
+    report = check_trace.check(board.trace, wrong_lamp)
+    assert not report["right"]
+    assert report["own"]["shift_words_wrong"] == report["sigrok"]["shift_words_wrong"] == 1
+    late = json.loads(json.dumps(program))
+    late["slots"][5]["period_ticks"] += 1
+    report = check_trace.check(board.trace, late)
+    assert not report["right"]
+    assert report["own"]["trigger_period_error_ticks"] == report["sigrok"]["trigger_period_error_ticks"] == 1
+
+
+def test_exposures_carry_the_lamps_and_exact_ticks_of_their_slots(emulated):
+    program = paper_program(cycles=1)
+    board = emulated(exposures=True)
+    received = []
+    reader = threading.Thread(target=lambda: received.extend(board.exposures_until("exposure", 180)))
+    reader.start()
+    link = play_to_the_end(board, program)
+    reader.join(timeout=30)
+    hello, *exposures = received
+    assert hello["tick_hz"] == 125_000_000 and hello["chain_bits"] == 176
+    assert [exposure["n"] for exposure in exposures] == list(range(180))
+    for exposure, slot in zip(exposures, program["slots"]):
+        rise, fall = exposure["rise"], exposure["fall"]
+        assert fall - rise == slot["exposure_ticks"]
+        lit = [] if slot["kind"] == wire.DARK else [{"on": rise, "off": fall, "bits": hex_digits(slot["bits"])}]
+        assert exposure["segments"] == lit
+    # The board's own witness measures to two ticks; it must see the same periods.
+    entries, lost = link.trigger_log()
+    assert lost == 0
+    measured = [entry[0] for entry in entries]
+    true = [exposure["rise"] for exposure in exposures]
+    assert {b - a for a, b in zip(measured, true)} <= {true[0] - measured[0] + off for off in (-1, 0, 1)}
+
+
+def test_stepping_every_cycle_gives_the_same_edges(emulated):
+    program = paper_program(cycles=2, slots=20)
+    traces = []
+    for arguments in ([], ["--naive"]):
+        board = emulated(*arguments, trace=True)
+        link = board.plug()
+        link.play(program)
+        link.wait_until([wire.DONE, wire.FAULT])
+        board.stop()
+        changes = check_trace.read_vcd(board.trace)
+        start = next(tick for tick, name, level in changes if name == "TRIG0" and level)
+        traces.append([(tick - start, name, level) for tick, name, level in changes if tick >= start])
+    assert traces[0] == traces[1]
+    assert len(traces[0]) > 20 * 176
+
+
+def test_a_uf2_file_plays_as_the_elf_file_does(emulated):
+    program = paper_program(cycles=1, slots=18)
+    board = emulated(trace=True, image=ROOT / "build/firmware/stage.uf2")
+    play_to_the_end(board, program)
+    board.stop()
+    assert check_trace.check(board.trace, program)["right"]
+
+
+def test_stop_ends_an_endless_program_dark(emulated):
+    board = emulated(trace=True)
+    link = board.plug()
+    link.play(paper_program(cycles=0, slots=18))
+    while link.status()["triggers_fired"] < 30:
+        pass
+    link.ask(wire.STOP)
+    assert link.status()["state"] == wire.LOADED
+    fired = link.status()["triggers_fired"]
+    board.stop()
+    changes = check_trace.read_vcd(board.trace)
+    last = {name: level for _, name, level in changes}
+    assert not any(last.values())
+    assert len([1 for _, name, level in changes if name == "TRIG0" and level]) == fired
+
+
+@pytest.mark.parametrize("damage, message", [
+    ({"exposure_ticks": 57_860}, "slot 3"),
+    ({"trigger_mask": 0x10}, "slot 3"),
+])
+def test_a_program_that_cannot_be_played_is_refused_with_its_slot(emulated, damage, message):
+    program = paper_program(cycles=1, slots=18)
+    program["slots"][3].update(damage)
+    with pytest.raises(BoardError) as refused:
+        emulated().plug().load(program)
+    assert refused.value.slot == 3 and message in refused.value.text

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+# Chooses the board that the tests run against: BOARD=emulated (the default).
+import os
+import shutil
+
+import pytest
+
+import board
+
+
+def pytest_configure():
+    kind = os.environ.get("BOARD", "emulated")
+    if kind != "emulated":
+        raise pytest.UsageError(f"BOARD={kind}: only `emulated` is there")
+    if not board.IMAGE.exists():
+        raise pytest.UsageError(f"{board.IMAGE}: no firmware image; build it with `make firmware`")
+    if not (board.EMULATOR.parent / "node_modules").exists():
+        raise pytest.UsageError(f"{board.EMULATOR.parent}: run `npm ci` there first")
+    if shutil.which("sigrok-cli") is None:
+        raise pytest.UsageError("sigrok-cli is missing: apt-get install sigrok-cli")
+
+
+@pytest.fixture
+def emulated():
+    """Starts emulated boards, and ends whatever a test leaves running."""
+    started = []
+
+    def start(*arguments, **options):
+        started.append(board.EmulatedBoard(*arguments, **options))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.__exit__()

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// Ray casting against a scene at one moment, on Embree 3.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "scene.hpp"
+
+namespace ols {
+
+constexpr int packet_size = 8;
+
+// Rays from eight points, as arrays; only those marked in `active` (-1, else 0) are cast.
+struct RayPacket {
+    alignas(32) int active[packet_size];
+    alignas(32) float origin[3][packet_size];
+    alignas(32) float direction[3][packet_size];  // need not be of unit length
+    alignas(32) float length[packet_size];        // in units of direction
+};
+
+struct SurfaceHit {
+    Float3 position;       // metres, at this moment
+    Float3 normal;         // unit, interpolated, at this moment
+    Float3 rest_position;  // of the object before it moved
+    Float3 rest_normal;
+    Float3 mask;
+    uint32_t object, material;
+    Pose pose;
+};
+
+class Geometry {
+  public:
+    // Places every object at its pose and builds the hierarchy; the scene must outlive this.
+    Geometry(const Scene& scene, double time_us);
+    ~Geometry();
+    Geometry(Geometry&&) noexcept;
+    Geometry& operator=(Geometry&&) noexcept;
+
+    // The nearest surface that a ray from `origin` along `direction` meets.
+    std::optional<SurfaceHit> intersect(Float3 origin, Float3 direction) const;
+
+    // Clears `clear[i]` for every active ray that something blocks.
+    void occlude(const RayPacket& rays, std::array<bool, packet_size>& clear) const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace ols

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+// stagesim render: pictures of a scene without sensor and noise, the truth that recorded takes are held against.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "effects/vignetting.hpp"
+#include "image/exr.hpp"
+#include "image/png.hpp"
+#include "image/tone.hpp"
+#include "inputs.hpp"
+#include "reflectance/lamp_weights.hpp"
+#include "renderer.hpp"
+#include "verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct RenderOptions {
+    InputOptions inputs;
+    std::vector<int> lamps;
+    bool all_lamps = false, olat = false;
+    std::string weights, env, env_convention, unit = "reflectance", out, png;
+    double rotate_deg = 0, exposure_ev = 0, time_us = 0, png_gain = 1;
+};
+
+// `{"weights": [w, ...]}` or `{"weights": [[r, g, b], ...]}`, one for each lamp from 0; the rest is dark.
+Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) {
+    std::ifstream file(path);
+    const auto json = nlohmann::json::parse(file, nullptr, false);
+    const Error wrong =
+        fail(fmt::format("'{}' must hold {{\"weights\": [...]}} with at most {} numbers or [r, g, b]", path, lamps));
+    if (!file || json.is_discarded() || !json.contains("weights") || !json["weights"].is_array()) return wrong;
+    if (json["weights"].size() > lamps) return wrong;
+    std::vector<Float3> weights(lamps);
+    for (size_t i = 0; i < json["weights"].size(); ++i) {
+        const auto& entry = json["weights"][i];
+        const bool rgb = entry.is_array() && entry.size() == 3;
+        for (const auto& value : rgb ? entry : nlohmann::json::array({entry}))
+            if (!value.is_number()) return wrong;
+        weights[i] = rgb ? Float3{entry[0], entry[1], entry[2]} : Float3{entry, entry, entry};
+    }
+    return weights;
+}
+
+// What `rf relight` gives a lamp: its share of the environment over pi.
+Result<std::vector<Float3>> environment_weights(const RenderOptions& options, const StageConfig& stage) {
+    std::optional<EnvConvention> convention;
+    if (!options.env_convention.empty()) {
+        const auto parsed = parse_env_convention(options.env_convention);
+        if (!parsed) return parsed.error();
+        convention = *parsed;
+    }
+    const auto environment = read_environment(options.env, convention);
+    if (!environment) return environment.error();
+    std::vector<Vec3> directions;
+    for (const LightPosition& lamp : stage.lamps) directions.push_back(lamp.direction);
+    const auto cells = SphereCells::make(directions);
+    if (!cells) return cells.error();
+    const LampWeights weights =
+        integrate_environment(*environment, *cells, {options.rotate_deg * std::numbers::pi / 180, options.exposure_ev});
+    std::vector<Float3> result(stage.lamp_count());
+    for (size_t i = 0; i < weights.irradiance.size(); ++i) {
+        const Rgb& w = weights.irradiance[i];
+        result[i] = Float3{float(w[0]), float(w[1]), float(w[2])} * std::numbers::inv_pi_v<float>;
+    }
+    return result;
+}
+
+Result<std::vector<Float3>> chosen_weights(const RenderOptions& options, const StageConfig& stage) {
+    const size_t count = size_t(stage.lamp_count());
+    if (!options.env.empty()) return environment_weights(options, stage);
+    if (!options.weights.empty()) return read_weights(options.weights, count);
+    std::vector<Float3> weights(count);
+    if (options.all_lamps)
+        std::fill(weights.begin(), weights.begin() + std::ptrdiff_t(stage.lamps.size()), Float3{1, 1, 1});
+    for (const int lamp : options.lamps) {
+        if (lamp < 0 || size_t(lamp) >= count)
+            return fail(fmt::format("--lamps: there is no lamp {}: the stage has 0 to {}", lamp, count - 1));
+        weights[lamp] = {1, 1, 1};
+    }
+    return weights;
+}
+
+// r units as they are; counts a microsecond have gain and vignetting, as the camera sees them.
+void to_unit(Image& image, const RenderOptions& options, const CameraConfig& camera) {
+    if (options.unit == "reflectance") return;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const float factor = float(camera.counts_per_us) *
+                                 Vignetting::factor(float(camera.vignetting), x, y, image.width, image.height);
+            for (int c = 0; c < 3; ++c) image.at(x, y, c) *= factor;
+        }
+}
+
+Status write_picture(const RenderOptions& options, Image image, const CameraConfig& camera, const std::string& path) {
+    to_unit(image, options, camera);
+    if (!path.empty())
+        if (const Status s = write_exr(path, image, ExrType::single_float, {{"unit", options.unit}}); !s) return s;
+    if (options.png.empty()) return Done{};
+    for (float& v : image.data) v *= float(options.png_gain);
+    return write_png_preview(options.png, image);
+}
+
+Status render_olat(const RenderOptions& options, Renderer& renderer, const CameraConfig& camera) {
+    std::error_code error;
+    std::filesystem::create_directories(options.out, error);
+    if (error) return fail("cannot make folder '" + options.out + "': " + error.message());
+    for (size_t lamp = 0; lamp < renderer.lamp_count(); ++lamp) {
+        std::vector<Float3> weights(renderer.lamp_count());
+        weights[lamp] = {1, 1, 1};
+        const std::string path = fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
+        if (const Status s = write_picture(options, renderer.light(weights, options.time_us), camera, path); !s)
+            return s;
+        show_progress("lamps", double(lamp + 1) / double(renderer.lamp_count()));
+    }
+    return Done{};
+}
+
+Status render(const RenderOptions& options) {
+    const auto inputs = read_inputs(options.inputs);
+    if (!inputs) return inputs.error();
+    // Linear light: no sensor; gain and vignetting come with --unit counts.
+    Renderer renderer(inputs->setup(false), options.inputs.disabled_set());
+    if (options.olat) return render_olat(options, renderer, inputs->camera);
+    const auto weights = chosen_weights(options, inputs->stage);
+    if (!weights) return weights.error();
+    return write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
+}
+
+}  // namespace
+
+void add_render_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<RenderOptions>();
+    CLI::App* verb = app.add_subcommand("render", "render a scene without sensor and noise");
+    verb->footer(
+        fmt::format("Units: reflectance is pi L / E, 1 for white facing a lamp at the stage centre; counts are the "
+                    "camera's counts a microsecond, with vignetting.\nPNG: {}.\n"
+                    "example: stagesim render tools/stagesim/scenes/head.toml --lamps 0,5 -o two.exr",
+                    tone_curve_text));
+    add_input_options(*verb, options->inputs);
+    auto* light = verb->add_option_group("light", "which lamps are on");
+    light->add_option("--lamps", options->lamps, "these lamps, each at 1")->delimiter(',');
+    light->add_flag("--all-lamps", options->all_lamps, "every lamp of the sphere at 1");
+    light->add_option("--weights", options->weights, "JSON file {\"weights\": [w or [r, g, b], ...]}");
+    light->add_option("--env", options->env, "environment map (.exr, .hdr): lamps weighted as `rf relight` does");
+    light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
+    light->require_option(1);
+    verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
+    verb->add_option("--rotate", options->rotate_deg,
+                     "turn the environment about +Y, degrees: light from +Z moves to +X");
+    verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
+    verb->add_option("--time-us", options->time_us, "moment of a moving scene");
+    verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));
+    verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
+    verb->add_option("--png", options->png, "preview file");
+    verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve");
+    verb->callback([options, &exit_code] {
+        const Status status = options->out.empty() && (options->png.empty() || options->olat)
+                                  ? Status(fail("nothing to write: give -o FILE.exr or --png FILE.png"))
+                                  : render(*options);
+        if (status) return;
+        fmt::print(stderr, "stagesim render: {}\n", status.error().message);
+        exit_code = 1;
+    });
+}
+
+}  // namespace ols

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// One camera's pictures of a scene: linear light for any mixture of lamps at any time, and exposures through the sensor.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <set>
+
+#include "lamp_images.hpp"
+
+namespace ols {
+
+// What rendering took, for `plan`.
+struct Cost {
+    uint64_t placings = 0;  // of the scene: 1 for a still one
+    uint64_t primary_rays = 0;
+    uint64_t visible_points = 0;  // of the last placing
+    uint64_t lamp_points = 0;     // visible points times lamps shaded
+    uint64_t exposures = 0;
+    double build_s = 0, visibility_s = 0, lamps_s = 0, sums_s = 0, sensor_s = 0;
+};
+
+class Renderer {
+  public:
+    // The setup's scene, stage and camera must outlive the renderer.
+    Renderer(const Setup& setup, const std::set<std::string>& disabled);
+
+    // Sum over lamps of weight * r image (pi L / E; white facing the lamp at the stage centre is 1) at a time of the
+    // scene; channels() channels, zero where nothing is. `weights` has one entry a lamp.
+    Image light(const std::vector<Float3>& weights, double time_us);
+
+    // Exposes each lamp for `lit_us[lamp]` microseconds at `time_us` and passes the light through lens and sensor.
+    Exposure expose(const std::vector<double>& lit_us, double time_us, uint64_t number, uint32_t camera);
+
+    // Shades every lamp of a still scene now, so that exposures cost only sums; `progress` gets 0 to 1.
+    void render_all_lamps(const std::function<void(double)>& progress);
+
+    int channels() const { return effects_.mosaic() ? 1 : 3; }
+    size_t lamp_count() const { return lamps_.size(); }
+    const EffectSet& effects() const { return effects_; }
+    const Cost& cost() const { return cost_; }
+
+  private:
+    void place(double time_us);
+    void render(const std::vector<uint32_t>& lamps);
+
+    Setup setup_;
+    EffectSet effects_;
+    std::vector<PlacedLamp> lamps_;
+    std::vector<Pose> poses_;  // of the placing that geometry_ and images_ hold
+    std::unique_ptr<Geometry> geometry_;
+    std::unique_ptr<LampImages> images_;
+    Cost cost_;
+};
+
+}  // namespace ols

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+// stagesim run: the emulated board plays, the virtual cameras see what it lit and deliver frames.
+#include <fmt/format.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "board_process.hpp"
+#include "inputs.hpp"
+#include "plan.hpp"
+#include "verbs.hpp"
+#include "virtual_camera.hpp"
+
+namespace ols {
+
+namespace {
+
+struct RunOptions {
+    InputOptions inputs;
+    std::string work, image, vcd, pace = "virtual", faults, camera_model = "on", board_program;
+    std::vector<std::string> board_faults;
+    bool once = false, no_board = false, json = false;
+};
+
+// With --once, a frame that waits this long for room in its ring is taken to have lost its reader for good.
+constexpr std::chrono::seconds reader_patience(20);
+// With --once, board time without exposures after the USB client has gone that counts as the end.
+constexpr uint64_t idle_ticks = 500'000;  // 4 ms
+
+std::atomic<bool> stop_requested = false;
+
+void request_stop(int) {
+    stop_requested = true;
+}
+
+std::filesystem::path program_folder() {
+    std::error_code error;
+    return std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+}
+
+// In a build tree (build/host/bin) things lie where they are built, otherwise beside the installed program.
+std::string find_part(const std::string& given, const char* in_tree, const char* installed) {
+    if (!given.empty()) return given;
+    const auto tree = (program_folder() / "../../.." / in_tree).lexically_normal();
+    if (std::filesystem::exists(tree)) return tree;
+    return (program_folder() / ".." / installed).lexically_normal();
+}
+
+class StageRun {
+  public:
+    explicit StageRun(const RunOptions& options) : options_(options) {}
+
+    Status run() {
+        if (const Status status = prepare(); !status) return status;
+        std::optional<BoardProcess> board;
+        if (!options_.no_board) {
+            auto started = start_board();
+            if (!started) return started.error();
+            board.emplace(std::move(*started));
+        }
+        std::thread patience([this] { watch_readers(); });
+        const Status status = follow(board ? &*board : nullptr);
+        ended_ = true;
+        patience.join();
+        for (auto& camera : cameras_) camera->finish();
+        if (!status) return status;
+        if (board)
+            if (const int code = board->wait(); code != 0)
+                return fail(fmt::format("the emulated board ended with status {}: its message is above", code));
+        return write_cost();
+    }
+
+  private:
+    Status prepare() {
+        auto inputs = read_inputs(options_.inputs);
+        if (!inputs) return inputs.error();
+        inputs_ = std::move(*inputs);
+        std::vector<Fault> faults;
+        if (!options_.faults.empty()) {
+            auto read = read_faults(options_.faults);
+            if (!read) return read.error();
+            faults = std::move(*read);
+        }
+        std::error_code error;
+        std::filesystem::create_directories(options_.work, error);
+        if (error) return fail("cannot make folder '" + options_.work + "': " + error.message());
+        for (uint32_t i = 0; i < inputs_.stage.cameras.size(); ++i)
+            if (const Status status = add_camera(i, faults); !status) return status;
+        auto listener = LineListener::listen(options_.work + "/exposures.sock");
+        if (!listener) return listener.error();
+        listener_.emplace(std::move(*listener));
+        return Done{};
+    }
+
+    Status add_camera(uint32_t index, const std::vector<Fault>& faults) {
+        const CameraConfig& config = inputs_.stage.cameras[index];
+        setups_.push_back(
+            std::make_unique<Setup>(Setup{inputs_.scene, inputs_.stage, config, options_.camera_model == "on"}));
+        // Some 64 MB of frames, so that the reader may pause without the board standing still.
+        const uint64_t bytes = frame_bytes(*setups_.back(), options_.inputs.disabled_set());
+        const uint32_t slots = uint32_t(std::clamp<uint64_t>((64 << 20) / bytes, 8, 256));
+        auto ring = RingWriter::create(fmt::format("{}/cam{}.ring", options_.work, index), slots, bytes);
+        if (!ring) return ring.error();
+        foretold_.push_back(foretell(*setups_.back(), options_.inputs.disabled_set()));
+        cameras_.push_back(std::make_unique<VirtualCamera>(*setups_.back(), options_.inputs.disabled_set(), index,
+                                                           std::move(*ring), faults, options_.pace == "virtual",
+                                                           cancelled_));
+        Renderer& renderer = cameras_.back()->renderer();
+        // The board starts when the lamps are done: its socket says that the stage is ready.
+        if (!renderer.effects().movement())
+            renderer.render_all_lamps([](double done) { show_progress("lamps", done); });
+        return Done{};
+    }
+
+    Result<BoardProcess> start_board() {
+        const std::string image =
+            find_part(options_.image, "build/firmware/stage.elf", "share/open-light-stage/stage.elf");
+        const std::string program = find_part(options_.board_program, "tools/stagesim/board/board.mjs",
+                                              "share/open-light-stage/board/board.mjs");
+        if (!std::filesystem::exists(image))
+            return fail("there is no firmware image '" + image + "': build it (`make firmware`) or give --image");
+        if (!std::filesystem::exists(program)) return fail("there is no emulated board '" + program + "'");
+        std::vector<std::string> command = {"node",         program,
+                                            "--image",      image,
+                                            "--usb",        options_.work + "/board.sock",
+                                            "--exposures",  options_.work + "/exposures.sock",
+                                            "--pace",       options_.pace,
+                                            "--chain-bits", std::to_string(inputs_.stage.chain_bits)};
+        if (!options_.vcd.empty()) command.insert(command.end(), {"--vcd", options_.vcd});
+        for (const std::string& fault : options_.board_faults) command.insert(command.end(), {"--inject", fault});
+        return BoardProcess::start(command);
+    }
+
+    // Handles lines until the board ends, or is told to and then does.
+    Status follow(BoardProcess* board) {
+        bool stopping = false;
+        std::string line;
+        for (;;) {
+            if (!stopping && (stop_requested || finished())) {
+                stopping = true;
+                cancelled_ = true;
+                if (!board) return Done{};
+                board->stop();
+            }
+            const auto event = listener_->read(line);
+            if (event == LineListener::Event::end) return Done{};
+            // Without a connection the board's end shows only in the process.
+            if (event == LineListener::Event::timeout && board && !board->running()) return Done{};
+            if (event != LineListener::Event::line) continue;
+            const auto message = parse_board_message(line);
+            if (!message) {
+                if (board) board->stop();
+                return message.error();
+            }
+            if (!stopping) handle(*message);
+        }
+    }
+
+    void handle(const BoardMessage& message) {
+        if (const auto* exposure = std::get_if<ExposureMessage>(&message)) {
+            quiet_since_ = exposure->fall;
+            for (size_t i = 0; i < cameras_.size(); ++i)
+                if (inputs_.stage.cameras[i].trigger == exposure->trigger) cameras_[i]->expose(*exposure);
+        } else if (const auto* now = std::get_if<NowMessage>(&message)) {
+            now_ = now->tick;
+            for (auto& camera : cameras_) camera->set_now(now->tick);
+        } else if (const auto* usb = std::get_if<UsbMessage>(&message)) {
+            client_gone_ = client_came_ && !usb->connected;
+            client_came_ = client_came_ || usb->connected;
+            quiet_since_ = now_;
+        }
+    }
+
+    bool finished() const { return options_.once && client_gone_ && now_ >= quiet_since_ + idle_ticks; }
+
+    // With --once, gives up on frames that nobody will ever take.
+    void watch_readers() {
+        while (!ended_) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+            if (stop_requested) cancelled_ = true;
+            const int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+            for (auto& camera : cameras_) {
+                const int64_t since_ns = camera->waiting_since_ns();
+                if (options_.once && since_ns != 0 && std::chrono::nanoseconds(now_ns - since_ns) > reader_patience)
+                    cancelled_ = true;
+            }
+        }
+    }
+
+    Status write_cost() {
+        nlohmann::json report;
+        for (size_t i = 0; i < cameras_.size(); ++i) {
+            VirtualCamera& camera = *cameras_[i];
+            nlohmann::json actual = account(camera.renderer());
+            actual["triggers"] = camera.triggers();
+            actual["frames_delivered"] = camera.delivered();
+            actual["frames_dropped"] = camera.dropped();
+            nlohmann::json entry = {{"foretold", foretold_[i]}, {"actual", actual}};
+            if (i == 0) report = entry;
+            report["cameras"].push_back(std::move(entry));
+        }
+        const std::string path = options_.work + "/cost.json";
+        std::ofstream file(path + ".part");
+        file << report.dump(2) << '\n';
+        file.close();
+        std::error_code error;
+        std::filesystem::rename(path + ".part", path, error);
+        if (!file || error) return fail("cannot write '" + path + "': check the space there");
+        if (options_.json) fmt::print("{}\n", report.dump(2));
+        return Done{};
+    }
+
+    const RunOptions& options_;
+    Inputs inputs_;
+    std::vector<std::unique_ptr<Setup>> setups_;
+    std::vector<nlohmann::json> foretold_;
+    std::vector<std::unique_ptr<VirtualCamera>> cameras_;
+    std::optional<LineListener> listener_;
+    std::atomic<bool> cancelled_ = false, ended_ = false;
+    bool client_came_ = false, client_gone_ = false;
+    uint64_t now_ = 0, quiet_since_ = 0;
+};
+
+}  // namespace
+
+void add_run_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<RunOptions>();
+    CLI::App* verb = app.add_subcommand("run", "play the stage: emulated board, lamps, cameras");
+    verb->footer(
+        "Makes WORK/board.sock (the board's USB), WORK/cam0.ring (frames) and, at the end, WORK/cost.json.\n"
+        "example: stagesim run tools/stagesim/scenes/head.toml --stage examples/stage.toml --work out/stage --once");
+    add_input_options(*verb, options->inputs);
+    verb->add_option("--work", options->work, "folder of sockets and rings")->required();
+    verb->add_option("--image", options->image, "firmware image (default: the one built here)");
+    verb->add_option("--vcd", options->vcd, "write the board's signals there");
+    verb->add_option("--pace", options->pace, "virtual: never outrun the reader; wall: drop and count")
+        ->check(CLI::IsMember({"virtual", "wall"}));
+    verb->add_option("--inject", options->faults, "faults.toml: faults of cameras and delivery");
+    verb->add_option("--board-inject", options->board_faults,
+                     "fault of the board, FAULT@WHEN as board.mjs --help says");
+    verb->add_option("--camera-model", options->camera_model,
+                     "off: float RGB counts without noise, mosaic, quantisation, saturation")
+        ->check(CLI::IsMember({"on", "off"}));
+    verb->add_option("--board-program", options->board_program, "the emulated board's board.mjs");
+    verb->add_flag("--no-board", options->no_board, "wait for a board that connects to WORK/exposures.sock by itself");
+    verb->add_flag("--once", options->once, "end when the board's USB client has gone and the board is idle");
+    verb->add_flag("--json", options->json, "print the cost as JSON at the end");
+    verb->callback([options, &exit_code] {
+        for (const int signal : {SIGTERM, SIGINT}) std::signal(signal, request_stop);
+        if (const Status status = StageRun(*options).run(); !status) {
+            fmt::print(stderr, "stagesim run: {}\n", status.error().message);
+            exit_code = 1;
+        }
+    });
+}
+
+}  // namespace ols

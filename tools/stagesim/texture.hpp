@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+// What a surface reflects at a point: plain materials, and procedural skin and eyes.
+#pragma once
+
+#include "scene.hpp"
+
+namespace ols {
+
+struct Look {
+    Float3 albedo;
+    float roughness = 1;
+    float f0 = 0;
+    Float3 normal;  // the shading normal, with the fine relief of skin
+};
+
+// `position` and `normal` in the object's rest pose (metres): textures move with the object. `mask` is the mesh's
+// vertex colour; for skin (lips, hair, flush), for eyes (angle from the axis over pi, -, -), each 0 to 1.
+Look look_of(const Material& material, Float3 position, Float3 normal, Float3 mask);
+
+}  // namespace ols

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// What the camera sees: one surface point a primary sample, with all that shading needs of it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "geometry.hpp"
+#include "pinhole.hpp"
+
+namespace ols {
+
+// Points in arrays, grouped into chunks of neighbouring pixels. Every chunk is filled up to whole packets with points of
+// weight 0, so that shading runs on packets only. A chunk's pixels belong to no other chunk.
+struct VisiblePoints {
+    struct Chunk {
+        uint32_t first_point, points;  // points are a multiple of packet_size
+        uint32_t first_pixel, pixels;  // in `pixels`
+    };
+
+    std::vector<float> position[3], normal[3], view[3];  // view: unit, to the camera
+    std::vector<float> albedo[3], roughness, f0;
+    std::vector<float> weight;    // 1 / samples a pixel, or 0
+    std::vector<uint32_t> pixel;  // index into `pixels`
+    std::vector<uint8_t> on_board;
+    std::vector<uint32_t> pixels;  // y * width + x of every pixel that sees anything
+    std::vector<Chunk> chunks;
+    int width = 0, height = 0, samples = 0;
+
+    size_t size() const { return weight.size(); }
+};
+
+// Casts `samples` rays (a square number, at the middles of a fixed grid) through every pixel. The same for any number
+// of threads.
+VisiblePoints find_visible_points(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int width,
+                                  int height, int samples);
+
+}  // namespace ols
