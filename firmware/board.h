@@ -45,10 +45,10 @@ void board_sleep(void);
 // To be called at least every 20 ms, or the processor is reset.
 void board_feed_watchdog(void);
 
-// True when the watchdog ended the previous run.
+// True when the watchdog, or board_reset, ended the previous run of this firmware.
 bool board_was_reset_by_watchdog(void);
 
-// Resets the processor now; looks like a watchdog reset afterwards.
+// Resets the processor now.
 _Noreturn void board_reset(void);
 
 // Three words that survive a watchdog reset, not a power-up.

@@ -9,7 +9,12 @@
 enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
 #define WAKE_INTERRUPTS (1u << IRQ_TIMER_0 | 1u << IRQ_USBCTRL | 1u << IRQ_PIO0_0)
 
+// In the fourth scratch register while this firmware runs: the boot ROM and debuggers reset by watchdog, too, and those
+// are no faults.
+#define RUNNING_MAGIC 0x6f6c7321u
+
 static volatile bool woken;
+static bool reset_by_watchdog;
 
 static void release_reset(uint32_t blocks) {
     REGISTER_SET(RESETS_RESET) = blocks;  // known state, also after a jump from a debugger
@@ -82,6 +87,8 @@ void board_init(void) {
     release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
     BUSCTRL_BUS_PRIORITY = BUS_PRIORITY_DMA;  // the processor waits rather than a FIFO
     TIMER_INTE = 1;
+    reset_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH(3) == RUNNING_MAGIC;
+    WATCHDOG_SCRATCH(3) = RUNNING_MAGIC;
     PSM_WDSEL = PSM_ALL_BUT_OSCILLATORS;
     board_feed_watchdog();
     WATCHDOG_CTRL = WATCHDOG_ENABLE;
@@ -115,7 +122,7 @@ void board_feed_watchdog(void) {
 }
 
 bool board_was_reset_by_watchdog(void) {
-    return WATCHDOG_REASON != 0;
+    return reset_by_watchdog;
 }
 
 _Noreturn void board_reset(void) {

@@ -10,6 +10,10 @@
 
 #include "wire.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // What of the board decides how a program is played.
 struct sequence_board {
     uint16_t chain_bits;     // 1..OLS_CHAIN_BITS_MAX
@@ -59,5 +63,9 @@ uint32_t sequence_slot_gap_ticks(void);
 // empty.
 bool sequence_compile(const struct sequence_board* board, const struct ols_load_begin* header, const uint8_t* program,
                       struct sequence* sequence, struct ols_error_reply* error);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

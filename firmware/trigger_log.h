@@ -8,6 +8,10 @@
 
 #include "sequence.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // Empties the log for a new start of `sequence`, which must stay as it is while triggers are added.
 void trigger_log_begin(const struct sequence* sequence);
 
@@ -28,5 +32,9 @@ uint32_t trigger_log_lost(void);
 // Of the last trigger; slot OLS_NO_SLOT before the first.
 uint16_t trigger_log_slot(void);
 uint32_t trigger_log_cycle(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

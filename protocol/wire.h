@@ -11,6 +11,8 @@
 #else
 #define OLS_WIRE_ASSERT _Static_assert
 #endif
+// The attribute and not the pragma: with it, the compiler refuses references to members that may be misaligned.
+#define OLS_PACKED __attribute__((packed))
 
 OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-endian, and so must be its users");
 
@@ -22,8 +24,6 @@ OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-e
 #define OLS_NO_SLOT 0xffff          // where no slot is to blame
 #define OLS_REPLY 0x80              // a reply's type is its request's with this bit
 
-#pragma pack(push, 1)
-
 // A frame is this header, `payload_bytes` of payload and the CRC-32 (u32) of both. `header_check` is the low half of
 // the CRC-32 of the eight bytes before it: a corrupt length is noticed at once, not after waiting for bytes that never
 // come.
@@ -33,7 +33,7 @@ struct ols_frame_header {
     uint16_t type;        // enum ols_message
     uint16_t request_id;  // chosen by the host, returned in the reply
     uint16_t header_check;
-};
+} OLS_PACKED;
 
 // Requests. Without a struct below, a request or reply has no payload.
 enum ols_message {
@@ -53,7 +53,7 @@ enum ols_message {
 // The first eight bytes of both structs never change, whatever else does, so that any two versions can compare hashes.
 struct ols_hello {
     uint64_t layout_hash;
-};
+} OLS_PACKED;
 
 enum ols_capability {
     OLS_CAN_OFFSET_TRIGGERS = 1  // trigger_offset_ticks may differ from 0
@@ -70,7 +70,7 @@ struct ols_hello_reply {
     uint16_t slots_max;
     uint32_t shift_ticks;     // to send one pattern
     uint32_t slot_gap_ticks;  // period_ticks - exposure_ticks must be at least this
-};
+} OLS_PACKED;
 
 // The program follows in chunks: slot_count times an ols_slot and its ceil(chain_bits / 32) pattern words.
 struct ols_load_begin {
@@ -79,11 +79,11 @@ struct ols_load_begin {
     uint32_t cycles;      // 0: until stopped
     uint32_t program_bytes;
     uint32_t program_crc32;
-};
+} OLS_PACKED;
 
 struct ols_load_chunk {
     uint32_t offset_bytes;  // of the data that follow, in the program
-};
+} OLS_PACKED;
 
 enum ols_slot_kind {
     OLS_BASIS = 0,
@@ -100,7 +100,7 @@ struct ols_slot {
     uint32_t exposure_ticks;       // of trigger and light
     uint32_t period_ticks;         // trigger rise to the next slot's trigger rise
     int32_t trigger_offset_ticks;  // 0 without OLS_CAN_OFFSET_TRIGGERS
-};
+} OLS_PACKED;
 
 enum ols_state {
     OLS_STATE_IDLE = 0,  // no program
@@ -133,13 +133,13 @@ struct ols_status_reply {
     uint32_t cycles_played;
     uint32_t log_entries_lost;
     uint32_t program_crc32;  // of the loaded program, 0 without
-};
+} OLS_PACKED;
 
 struct ols_read_trigger_log {
     uint32_t first_counter;
     uint16_t entries_max;
     uint16_t reserved;  // 0
-};
+} OLS_PACKED;
 
 struct ols_trigger_log_reply {
     uint32_t first_counter;  // of the first entry that follows
@@ -147,7 +147,7 @@ struct ols_trigger_log_reply {
     uint32_t entries_lost;   // since start
     uint16_t entry_count;
     uint16_t reserved;  // 0
-};
+} OLS_PACKED;
 
 // A trigger as measured at the pin. Only TRIG0 is watched: slots without it in their mask have no entry.
 struct ols_trigger_log_entry {
@@ -156,7 +156,7 @@ struct ols_trigger_log_entry {
     uint32_t cycle;
     uint16_t slot;
     uint16_t trigger_mask;
-};
+} OLS_PACKED;
 
 enum ols_error_code {
     OLS_ERROR_UNKNOWN_MESSAGE = 1,
@@ -172,9 +172,7 @@ struct ols_error_reply {
     uint16_t code;   // enum ols_error_code
     uint16_t slot;   // or OLS_NO_SLOT
     char text[116];  // what is wrong and what to do, zero-terminated
-};
-
-#pragma pack(pop)
+} OLS_PACKED;
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");

@@ -110,7 +110,7 @@ class Program:
 
     def encode_irq(self, operands):
         mode, _, index = operands.rpartition(' ')
-        clear_wait = lookup({'': 0, 'set': 0, 'nowait': 0, 'wait': 1, 'clear': 2}, mode.strip(), 'mode')
+        clear_wait = lookup({'': 0, 'wait': 1, 'clear': 2}, mode.strip(), 'mode')
         return 6 << 13 | clear_wait << 5 | number(index, 0, 7, 'flag')
 
     def encode_set(self, operands):

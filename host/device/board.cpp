@@ -27,7 +27,7 @@ Error refusal(std::span<const uint8_t> payload) {
     std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));
     const std::string text(error.text, strnlen(error.text, sizeof error.text));
     if (error.slot == OLS_NO_SLOT) return fail("the board refused: " + text);
-    return fail(fmt::format("the board refused: {} (slot {})", text, error.slot));
+    return fail(fmt::format("the board refused: {} (slot {})", text, uint16_t(error.slot)));
 }
 
 Error wrong_reply() {
@@ -58,7 +58,7 @@ std::string fault_text(const ols_status_reply& status) {
             text = "bad_memory: the program in memory changed; load it again, and check the power supply";
             break;
     }
-    const std::string slot = status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", status.fault_slot);
+    const std::string slot = status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
     return fmt::format("{} (at tick {}{})", text, uint64_t(status.fault_ticks), slot);
 }
 

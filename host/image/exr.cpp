@@ -82,6 +82,10 @@ Status write_exr(const std::string& path, const Image& image, ExrType type,
     try {
         Imf::Header header(image.width, image.height);
         for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
+        // The defaults of the type are the primaries and white point of Rec. 709.
+        const auto color = attributes.find("colorInteropID");
+        if (color != attributes.end() && color->second == "lin_rec709_scene")
+            Imf::addChromaticities(header, Imf::Chromaticities());
         const bool half = type == ExrType::half_float;
         for (const auto& name : channels) header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
 

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-import wire
-from board import ROOT, BoardError
+from ols_board import wire
+from ols_board.board import ROOT, BoardError
 
 HASH_TOOL = ROOT / "protocol/layout_hash.py"
 WIRE_H = ROOT / "protocol/wire.h"

@@ -8,9 +8,9 @@ import threading
 import pytest
 
 import check_trace
-import wire
-from board import ROOT, BoardError
-from program import paper_program
+from ols_board import wire
+from ols_board.board import ROOT, BoardError
+from ols_board.program import paper_program
 
 
 def hex_digits(bits):

@@ -4,8 +4,9 @@ import struct
 
 import pytest
 
-import wire
-from usb import BULK, BULK_IN, BULK_OUT, CANCEL, CANCELLED, OK, STALL, TIMED_OUT
+from ols_board import wire
+from ols_board.program import paper_program
+from ols_board.usb import BULK, BULK_IN, BULK_OUT, CANCEL, CANCELLED, OK, STALL, TIMED_OUT
 
 GET_DEVICE_DESCRIPTOR = bytes((0x80, 6, 0, 1, 0, 0, 18, 0))
 VENDOR_UNKNOWN = bytes((0xC0, 0x77, 0, 0, 0, 0, 4, 0))
@@ -76,8 +77,6 @@ def test_replies_come_by_tag_while_a_read_waits(emulated):
 
 
 def test_unplugging_and_plugging_gives_a_fresh_link_with_the_program_still_loaded(emulated):
-    from program import paper_program
-
     board = emulated()
     link = board.plug()
     link.load(paper_program(cycles=1, slots=18))

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 # Whatever goes wrong while a program plays: dark, triggers idle, a latched fault that names its cause.
+import threading
+
 import pytest
 
 import check_trace
-import wire
-from board import BoardError
-from program import PERIOD_TICKS, paper_program
+from ols_board import wire
+from ols_board.board import BoardError
+from ols_board.program import PERIOD_TICKS, paper_program
 
 MS = 125_000  # ticks
 
@@ -59,8 +61,6 @@ def test_a_fault_in_play_ends_dark_with_its_cause(emulated, fault, cause, within
 
 
 def test_a_reset_in_play_is_dark_at_once_and_tells_the_virtual_stage(emulated):
-    import threading
-
     board = emulated("--inject", "reset@trigger:50", trace=True, exposures=True)
     received = []
     reader = threading.Thread(target=lambda: received.extend(board.exposures_until("reset", 1)))

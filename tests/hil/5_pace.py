@@ -5,8 +5,8 @@ import os
 import threading
 import time
 
-import wire
-from program import PERIOD_TICKS, paper_program
+from ols_board import wire
+from ols_board.program import PERIOD_TICKS, paper_program
 
 
 def cpu_seconds(process):

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-import board
+from ols_board import board
 
 
 def pytest_configure():

@@ -1,206 +1,407 @@
 // SPDX-License-Identifier: MIT
-// The sequence compiler against the layout that Wenger section 4 gives, and its optical code against brute force.
-// links: ols_stage
+// The firmware's compiled sequences, played by an interpreter of the PIO programs: lamps and times are the program's.
+// links: ols_firmware
+#include "sequence.h"
+
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <numbers>
-#include <set>
+#include <memory>
+#include <random>
+#include <string>
 
-#include "stage/flicker.hpp"
-#include "stage/sequence.hpp"
+#include "pio_interpreter.hpp"
+#include "pulse.h"
 
-using namespace ols;
+using ols::test::PioBlock;
+using ols::test::PioMachine;
 
 namespace {
 
-Sequence compile(const std::string& basis, double exposure_us = 100) {
-    SequenceConfig config;
-    config.basis = basis;
-    config.basis_exposure_us = exposure_us;
-    auto sequence = compile_sequence(config, default_stage());
-    EXPECT_TRUE(sequence.ok()) << (sequence.ok() ? "" : sequence.error().message);
-    return *sequence;
+struct Slot {
+    ols_slot header{};
+    std::vector<uint32_t> pattern;
+};
+
+struct Program {
+    sequence_board board{176, 1};
+    uint32_t cycles = 1;
+    std::vector<Slot> slots;
+
+    std::vector<uint8_t> bytes() const {
+        std::vector<uint8_t> all;
+        const auto append = [&](const void* from, size_t count) {
+            const auto* first = static_cast<const uint8_t*>(from);
+            all.insert(all.end(), first, first + count);
+        };
+        for (const Slot& slot : slots) {
+            append(&slot.header, sizeof slot.header);
+            append(slot.pattern.data(), slot.pattern.size() * 4);
+        }
+        return all;
+    }
+};
+
+struct Compiled {
+    bool ok = false;
+    std::unique_ptr<sequence> words = std::make_unique<sequence>();
+    ols_error_reply error{};
+};
+
+Compiled compile(const Program& program) {
+    const std::vector<uint8_t> bytes = program.bytes();
+    ols_load_begin header{};
+    header.slot_count = uint16_t(program.slots.size());
+    header.chain_bits = program.board.chain_bits;
+    header.cycles = program.cycles;
+    header.program_bytes = uint32_t(bytes.size());
+    Compiled result;
+    result.ok = sequence_compile(&program.board, &header, bytes.data(), result.words.get(), &result.error);
+    return result;
 }
 
-std::vector<SlotKind> kinds_of(const Sequence& sequence) {
-    std::vector<SlotKind> kinds;
-    for (const Slot& slot : sequence.slots) kinds.push_back(slot.kind);
-    return kinds;
+bool bit_of(const std::vector<uint32_t>& words, int bit) {
+    return words[bit / 32] >> (31 - bit % 32) & 1;
 }
 
-std::string error_of_file(const std::string& text) {
-    const auto path = std::filesystem::temp_directory_path() / ("sequence" + std::to_string(getpid()) + ".toml");
-    std::ofstream(path) << text;
-    const auto read = read_sequence(path);
-    std::filesystem::remove(path);
-    return read.ok() ? "" : read.error().message;
+Slot slot(ols_slot_kind kind, uint32_t exposure_ticks, uint32_t period_ticks, int words = 6, uint8_t trigger_mask = 1) {
+    Slot made;
+    made.header.kind = uint8_t(kind);
+    made.header.trigger_mask = trigger_mask;
+    made.header.exposure_ticks = exposure_ticks;
+    made.header.period_ticks = period_ticks;
+    made.pattern.assign(size_t(words), 0);
+    return made;
+}
+
+Program random_program(std::mt19937& random, uint16_t chain_bits, int slot_count) {
+    Program program;
+    program.board.chain_bits = chain_bits;
+    const int words = (chain_bits + 31) / 32;
+    const uint32_t shift_ticks = sequence_shift_ticks(&program.board), gap_ticks = sequence_slot_gap_ticks();
+    for (int n = 0; n < slot_count; n++) {
+        const uint32_t exposure_ticks = 7 + random() % 4000;
+        const uint32_t spare_ticks = random() % 3 ? random() % 2000 : 0;
+        const uint32_t period_ticks = std::max(exposure_ticks, shift_ticks) + gap_ticks + spare_ticks;
+        Slot made = slot(ols_slot_kind(random() % 4), exposure_ticks, period_ticks, words, uint8_t(random() % 16));
+        if (made.header.kind != OLS_DARK)
+            for (int bit = 0; bit < chain_bits; bit++)
+                made.pattern[bit / 32] |= uint32_t(random() & 1) << (31 - bit % 32);
+        program.slots.push_back(made);
+    }
+    return program;
+}
+
+// Pins of the interpreter, timeline first as on the board.
+enum { LATCH, LIGHT_EN, TRIG0, SYNC = 6, DATA = 8, CLK = 9 };
+
+// Both machines, the chain of drivers behind them, and what happened: one entry for each LATCH.
+struct Stage {
+    struct Played {
+        uint64_t latch = 0, light_on = 0, light_off = 0;
+        uint64_t trigger_on[4]{}, trigger_off[4]{};
+        bool sync = false;
+        std::vector<bool> lamps;
+    };
+
+    PioBlock block;
+    PioMachine timeline{block, TIMELINE_PROGRAM, TIMELINE_WRAP_TARGET, TIMELINE_WRAP};
+    PioMachine shifter{block, SHIFTER_PROGRAM, SHIFTER_WRAP_TARGET, SHIFTER_WRAP};
+    std::vector<bool> chain;
+    std::vector<Played> played;
+    uint64_t now = 0;
+    uint32_t pins_before = 0;
+
+    Stage(const Program& program, const sequence& words) {
+        timeline.out_count = 8;
+        timeline.shift_right = true;
+        timeline.pc = TIMELINE_NEXT;
+        timeline.table.assign(words.events, words.events + words.event_count);
+        timeline.y = words.cycles - 1;
+        shifter.side_bits = 1;
+        shifter.side_pin = CLK;
+        shifter.out_pin = DATA;
+        shifter.out_count = 1;
+        shifter.status_below = words.pattern_words;
+        shifter.isr = program.board.chain_bits - 1u;
+        shifter.table.assign(words.patterns, words.patterns + words.slot_count * words.pattern_words);
+    }
+
+    void tick() {
+        timeline.tick();
+        shifter.tick();
+        now++;
+        see_pins();
+    }
+
+    // As player_arm does: the first pattern is in the chain before the timeline starts.
+    void arm() {
+        block.flags = 1 << 4;
+        for (int n = 0; n < 10000 && !(block.flags & 1 << 5); n++) {
+            shifter.tick();
+            see_pins();
+        }
+        block.flags = 0;
+    }
+
+    bool ended() const { return block.flags & 7; }
+
+    void run(uint64_t ticks) {
+        for (const uint64_t end = now + ticks; now < end && !ended();) tick();
+    }
+
+  private:
+    void see_pins() {
+        const uint32_t up = block.pins & ~pins_before, down = pins_before & ~block.pins;
+        pins_before = block.pins;
+        if (up >> CLK & 1) chain.push_back(block.pins >> DATA & 1);
+        if (up >> LATCH & 1) {
+            Played next;
+            next.latch = now;
+            next.lamps = std::exchange(chain, {});
+            next.sync = block.pins >> SYNC & 1;
+            played.push_back(next);
+        }
+        if (played.empty()) return;
+        if (up >> LIGHT_EN & 1) played.back().light_on = now;
+        if (down >> LIGHT_EN & 1) played.back().light_off = now;
+        for (int n = 0; n < 4; n++) {
+            if (up >> (TRIG0 + n) & 1) played.back().trigger_on[n] = now;
+            if (down >> (TRIG0 + n) & 1) played.back().trigger_off[n] = now;
+        }
+    }
+};
+
+void expect_plays_program(const Stage& stage, const Program& program) {
+    ASSERT_EQ(stage.played.size(), program.slots.size() * program.cycles);
+    uint64_t rise = stage.played[0].latch + SEQUENCE_LATCH_TICKS;
+    for (size_t n = 0; n < stage.played.size(); n++) {
+        SCOPED_TRACE("slot " + std::to_string(n));
+        const Stage::Played& played = stage.played[n];
+        const Slot& slot = program.slots[n % program.slots.size()];
+        const uint64_t fall = rise + slot.header.exposure_ticks;
+        for (int trigger = 0; trigger < 4; trigger++) {
+            const bool fires = slot.header.trigger_mask >> trigger & 1;
+            EXPECT_EQ(played.trigger_on[trigger], fires ? rise : 0);
+            EXPECT_EQ(played.trigger_off[trigger], fires ? fall : 0);
+        }
+        const bool lit = slot.header.kind != OLS_DARK;
+        EXPECT_EQ(played.light_on, lit ? rise : 0);
+        EXPECT_EQ(played.light_off, lit ? fall : 0);
+        EXPECT_EQ(played.sync, n % program.slots.size() == 0);
+        ASSERT_EQ(played.lamps.size(), program.board.chain_bits);
+        for (int bit = 0; bit < program.board.chain_bits; bit++)
+            ASSERT_EQ(played.lamps[bit], bit_of(slot.pattern, bit)) << "bit " << bit;
+        rise += slot.header.period_ticks;
+    }
+}
+
+TEST(Sequence, random_programs_play_exactly_their_lamps_and_times) {
+    std::mt19937 random(20);
+    for (const uint16_t chain_bits : {1, 16, 31, 32, 33, 176, 255, 256}) {
+        for (int repeat = 0; repeat < 3; repeat++) {
+            SCOPED_TRACE(std::to_string(chain_bits) + " bits");
+            Program program = random_program(random, chain_bits, 1 + int(random() % 12));
+            program.cycles = 1 + random() % 3;
+            const Compiled compiled = compile(program);
+            ASSERT_TRUE(compiled.ok) << compiled.error.text;
+            Stage stage(program, *compiled.words);
+            stage.arm();
+            stage.run(10'000'000);
+            EXPECT_EQ(stage.block.flags & 7, 1u << 1) << "ends by having played all cycles";
+            EXPECT_EQ(stage.block.pins & 0xff, 0u);
+            expect_plays_program(stage, program);
+        }
+    }
+}
+
+TEST(Sequence, exposures_and_periods_beyond_one_event_stay_exact) {
+    // Around the 19 bits of an event's operand, where long holds come in.
+    for (const uint32_t exposure_ticks : {524'200u, 524'293u, 524'294u, 524'295u, 524'301u, 1'200'007u}) {
+        for (const uint32_t rest_ticks : {1400u, 524'312u, 524'313u, 524'314u, 700'001u}) {
+            Program program;
+            program.slots = {slot(OLS_BASIS, exposure_ticks, exposure_ticks + rest_ticks), slot(OLS_BASIS, 100, 2000)};
+            program.slots[0].pattern[0] = 0x80000001;
+            const Compiled compiled = compile(program);
+            ASSERT_TRUE(compiled.ok) << compiled.error.text;
+            Stage stage(program, *compiled.words);
+            stage.arm();
+            stage.run(3'000'000);
+            expect_plays_program(stage, program);
+        }
+    }
+}
+
+TEST(Sequence, an_endless_program_goes_on_without_a_gap) {
+    Program program;
+    program.cycles = 0;
+    program.slots = {slot(OLS_BASIS, 300, 1500), slot(OLS_DARK, 200, 1700)};
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok);
+    Stage stage(program, *compiled.words);
+    stage.arm();
+    stage.run(3200 * 50 + SEQUENCE_LATCH_TICKS);
+    program.cycles = 50;
+    stage.played.resize(100);
+    expect_plays_program(stage, program);
+}
+
+TEST(Sequence, a_one_slot_cycle_still_gives_sync_an_edge_each_cycle) {
+    Program program;
+    program.cycles = 3;
+    program.slots = {slot(OLS_BASIS, 300, 1500)};
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok);
+    Stage stage(program, *compiled.words);
+    stage.arm();
+    int rises = 0;
+    for (uint32_t before = 0; !stage.ended(); before = stage.block.pins) {
+        stage.tick();
+        rises += (stage.block.pins & ~before) >> SYNC & 1;
+    }
+    EXPECT_EQ(rises, 3);
+}
+
+TEST(Sequence, a_starved_timeline_is_dark_from_the_tick_at_which_the_missing_event_was_to_begin) {
+    std::mt19937 random(3);
+    const Program program = random_program(random, 176, 8);
+    const Compiled compiled = compile(program);
+    for (uint64_t words = 1; words < compiled.words->event_count; words++) {
+        Stage fed(program, *compiled.words), starved(program, *compiled.words);
+        starved.timeline.words_fed = words;
+        fed.arm();
+        starved.arm();
+        while (fed.timeline.words_pulled <= words) {
+            ASSERT_EQ(starved.block.pins, fed.block.pins);
+            fed.tick();
+            starved.tick();
+        }
+        for (int n = 0; n < 10'000; n++) {
+            starved.tick();
+            ASSERT_EQ(starved.block.pins & 0xff, 0u);
+        }
+        EXPECT_EQ(starved.block.flags & 7, 1u) << "and the processor is told";
+    }
+}
+
+TEST(Sequence, a_starved_shifter_never_lets_half_a_pattern_be_latched) {
+    std::mt19937 random(4);
+    const Program program = random_program(random, 176, 8);
+    const Compiled compiled = compile(program);
+    const uint64_t all_words = compiled.words->slot_count * compiled.words->pattern_words;
+    for (uint64_t words = compiled.words->pattern_words; words < all_words; words++) {
+        Stage stage(program, *compiled.words);
+        stage.shifter.words_fed = words;
+        stage.arm();
+        stage.run(100'000);
+        EXPECT_EQ(stage.block.flags & 7, 1u << 2) << "the shifter says so";
+        for (int n = 0; n < 20'000; n++) stage.tick();
+        EXPECT_EQ(stage.block.pins & 0xff & ~(1u << SYNC), 0u) << "and the timeline waits in the dark";
+        EXPECT_EQ(stage.played.size(), words / compiled.words->pattern_words);
+        for (const Stage::Played& played : stage.played) EXPECT_EQ(played.lamps.size(), 176u);
+    }
+}
+
+TEST(Sequence, the_board_figures_are_tight) {
+    // The shortest period that is accepted plays; its shift ends just before the sync asks for it.
+    Program program;
+    const uint32_t shortest_ticks = sequence_shift_ticks(&program.board) + sequence_slot_gap_ticks();
+    program.slots = {slot(OLS_BASIS, 7, shortest_ticks),
+                     slot(OLS_BASIS, shortest_ticks - sequence_slot_gap_ticks(), shortest_ticks)};
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok) << compiled.error.text;
+    Stage stage(program, *compiled.words);
+    stage.arm();
+    stage.run(100'000);
+    expect_plays_program(stage, program);
+    EXPECT_LT(shortest_ticks, 1300u) << "10.4 us: 2160 Hz leaves 452 of 463 us for light";
+}
+
+TEST(Sequence, what_cannot_be_played_is_refused_with_slot_and_reason) {
+    const auto refused = [](auto change, const char* reason) {
+        Program program;
+        for (int n = 0; n < 4; n++) program.slots.push_back(slot(OLS_BASIS, 1000, 3000));
+        change(program);
+        const Compiled compiled = compile(program);
+        EXPECT_FALSE(compiled.ok);
+        EXPECT_EQ(compiled.error.code, OLS_ERROR_BAD_PROGRAM);
+        EXPECT_NE(std::string(compiled.error.text).find(reason), std::string::npos) << compiled.error.text;
+        EXPECT_EQ(compiled.words->slot_count, 0);
+        return compiled.error.slot;
+    };
+    EXPECT_EQ(refused([](Program& p) { p.slots[2].header.kind = 4; }, "unknown kind 4"), 2);
+    EXPECT_EQ(refused([](Program& p) { p.slots[1].header.trigger_mask = 16; }, "trigger mask 16"), 1);
+    EXPECT_EQ(refused([](Program& p) { p.slots[3].header.reserved = 1; }, "reserved"), 3);
+    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.trigger_offset_ticks = -5; }, "offset"), 0);
+    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.exposure_ticks = 6; }, "at least 7 ticks"), 0);
+    EXPECT_EQ(refused([](Program& p) { p.slots[1].header.exposure_ticks = 2974; }, "exceed the exposure"), 1);
+    EXPECT_EQ(refused([](Program& p) { p.slots[1].header.exposure_ticks = 0xffffffff; }, "exceed the exposure"), 1);
+    EXPECT_EQ(refused([](Program& p) { p.slots[2].header.period_ticks = 1100; }, "slot 2: period"), 2);
+    EXPECT_EQ(refused([](Program& p) { p.slots[2].pattern[5] = 0x00008000; }, "past the end of the chain"), 2);
+    EXPECT_EQ(refused(
+                  [](Program& p) {
+                      p.slots[3].header.kind = OLS_DARK;
+                      p.slots[3].pattern[0] = 1;
+                  },
+                  "dark slot"),
+              3);
+    EXPECT_EQ(refused([](Program& p) { p.slots.clear(); }, "1 to 1024 slots"), OLS_NO_SLOT);
+    EXPECT_EQ(refused([](Program& p) { p.slots.resize(1025, p.slots[0]); }, "1 to 1024 slots"), OLS_NO_SLOT);
+    EXPECT_EQ(refused([](Program& p) { p.slots[1].pattern.pop_back(); }, "has 160 bytes"), OLS_NO_SLOT);
+    EXPECT_EQ(refused(
+                  [](Program& p) {
+                      for (Slot& s : p.slots) s.header.period_ticks = 0xfffffff0;
+                      p.slots.resize(1024, p.slots[0]);
+                  },
+                  "events"),
+              15);
+}
+
+TEST(Sequence, a_program_for_another_chain_is_refused) {
+    Program program;
+    program.slots = {slot(OLS_BASIS, 1000, 3000)};
+    const std::vector<uint8_t> bytes = program.bytes();
+    const ols_load_begin header = {1, 160, 1, uint32_t(bytes.size()), 0};
+    sequence words;
+    ols_error_reply error{};
+    EXPECT_FALSE(sequence_compile(&program.board, &header, bytes.data(), &words, &error));
+    EXPECT_STREQ(error.text, "this board's chain has 176 bits: compile the program for that");
+}
+
+TEST(Sequence, a_full_program_of_1024_slots_fits) {
+    Program program;
+    for (int n = 0; n < OLS_SLOTS_MAX; n++) program.slots.push_back(slot(OLS_BASIS, 51'500, 57'870));
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok) << compiled.error.text;
+    const size_t bytes = 4 * (compiled.words->event_count + compiled.words->slot_count * compiled.words->pattern_words);
+    EXPECT_EQ(bytes, 1024 * 36 + 4) << "36 bytes a slot, and the end of the cycle";
+}
+
+TEST(Witness, counts_every_second_tick_in_every_path) {
+    std::mt19937 random(6);
+    PioBlock block;
+    PioMachine witness{block, WITNESS_PROGRAM, WITNESS_WRAP_TARGET, WITNESS_WRAP};
+    for (int repeat = 0; repeat < 500; repeat++) {
+        witness.x = random() % 3000;  // passes zero somewhere below, with the pin low or high or changing
+        witness.pushed.clear();
+        std::vector<uint64_t> rises;
+        uint64_t now = 0;
+        const auto run = [&](uint64_t ticks) {
+            for (; ticks > 0; ticks--, now++) witness.tick();
+        };
+        for (int edge = 0; edge < 10; edge++) {
+            block.pins = 0;
+            run(8 + random() % 500);
+            block.pins = 1;
+            rises.push_back(now);
+            run(8 + random() % 500);
+        }
+        ASSERT_EQ(witness.pushed.size(), rises.size());
+        for (size_t n = 1; n < rises.size(); n++) {
+            const uint32_t counted = witness.pushed[0] - witness.pushed[n];
+            EXPECT_LE(std::abs(int64_t(2 * counted) - int64_t(rises[n] - rises[0])), 2) << "edge " << n;
+        }
+    }
 }
 
 }  // namespace
-
-TEST(Sequence, every_basis_fills_the_180_slots_of_the_paper_and_shows_each_row_once) {
-    for (const auto& [name, rows] : std::map<std::string, int>{{"single", 156}, {"s159", 159}, {"hadamard156", 156}}) {
-        const Sequence sequence = compile(name);
-        ASSERT_EQ(sequence.slots.size(), 180u) << name;
-        std::map<SlotKind, int> count;
-        std::set<int> seen;
-        for (size_t s = 0; s < 180; ++s) {
-            const Slot& slot = sequence.slots[s];
-            ++count[slot.kind];
-            EXPECT_EQ(slot.kind == SlotKind::tracking, s % 18 == 0);
-            EXPECT_EQ(slot.kind == SlotKind::matte, s % 18 == 1);
-            if (slot.kind == SlotKind::basis) seen.insert(slot.row);
-            EXPECT_EQ(slot.period_ticks, 57870u);
-        }
-        EXPECT_EQ(count[SlotKind::tracking], 10) << name;
-        EXPECT_EQ(count[SlotKind::matte], 10) << name;
-        EXPECT_EQ(count[SlotKind::dark], 160 - rows) << name;
-        EXPECT_EQ(int(seen.size()), rows) << name;
-        EXPECT_EQ(*seen.rbegin(), rows - 1) << name;
-    }
-}
-
-TEST(Sequence, a_slot_lights_the_lamps_of_its_kind) {
-    const Sequence sequence = compile("s159");
-    for (const Slot& slot : sequence.slots)
-        for (int lamp = 0; lamp < 162; ++lamp) {
-            const bool sphere = lamp < 156;
-            const bool lit = slot.kind == SlotKind::tracking ? sphere
-                             : slot.kind == SlotKind::matte  ? !sphere
-                             : slot.kind == SlotKind::dark   ? false
-                                                             : sphere && sequence.basis.lit(slot.row, lamp);
-            ASSERT_EQ(slot.lit[size_t(lamp)] != 0, lit) << slot_kind_name(slot.kind) << " lamp " << lamp;
-        }
-}
-
-TEST(Sequence, a_dark_slot_alone_tells_where_in_the_cycle_it_is) {
-    for (const char* name : {"single", "s159", "hadamard156"}) {
-        std::set<size_t> distances;
-        size_t dark = 0;
-        const auto kinds = kinds_of(compile(name));
-        for (size_t s = 0; s < kinds.size(); ++s)
-            if (kinds[s] == SlotKind::dark) ++dark, distances.insert(s % 18);
-        EXPECT_GE(dark, 1u) << name;
-        EXPECT_EQ(distances.size(), dark) << name;
-    }
-}
-
-TEST(Sequence, an_order_that_a_rotation_repeats_is_found) {
-    using enum SlotKind;
-    EXPECT_TRUE(has_unique_order({tracking, matte, dark, basis}));
-    EXPECT_FALSE(has_unique_order({tracking, matte, basis, tracking, matte, basis}));
-    EXPECT_FALSE(has_unique_order({basis, basis, basis}));
-    EXPECT_FALSE(has_unique_order({}));
-    // Dark slots opposite each other: half a turn gives the same order.
-    std::vector<SlotKind> opposite(36, basis);
-    opposite[0] = opposite[18] = tracking;
-    opposite[7] = opposite[25] = dark;
-    EXPECT_FALSE(has_unique_order(opposite));
-    opposite[25] = basis;
-    opposite[26] = dark;
-    EXPECT_TRUE(has_unique_order(opposite));
-}
-
-TEST(Sequence, the_length_follows_the_basis_and_the_group) {
-    SequenceConfig config;
-    for (const int group_slots : {3, 10, 18, 54, 200}) {
-        config.group_slots = group_slots;
-        const auto sequence = compile_sequence(config, default_stage());
-        ASSERT_TRUE(sequence.ok());
-        size_t dark = 0;
-        for (const Slot& slot : sequence->slots) dark += slot.kind == SlotKind::dark;
-        EXPECT_EQ(sequence->slots.size() % size_t(group_slots), 0u);
-        EXPECT_GE(dark, 1u);
-        EXPECT_LE(dark, size_t(group_slots - 2));
-    }
-}
-
-TEST(Sequence, the_program_bytes_are_slots_and_patterns_most_significant_bit_first) {
-    StageConfig stage = default_stage();
-    stage.chain_bit_of_lamp[3] = 175;  // the last bit of the last word's upper half
-    SequenceConfig config;
-    const auto sequence = compile_sequence(config, stage);
-    ASSERT_TRUE(sequence.ok());
-    const auto bytes = encode_program(*sequence, stage);
-    const size_t record = 16 + 6 * 4;
-    ASSERT_EQ(bytes.size(), 180 * record);
-    for (size_t s = 0; s < 180; ++s) {
-        const Slot& slot = sequence->slots[s];
-        EXPECT_EQ(bytes[s * record], uint8_t(slot.kind));
-        EXPECT_EQ(bytes[s * record + 1], 1);
-        uint32_t exposure_ticks, period_ticks;
-        std::memcpy(&exposure_ticks, &bytes[s * record + 4], 4);
-        std::memcpy(&period_ticks, &bytes[s * record + 8], 4);
-        EXPECT_EQ(period_ticks, 57870u);
-        EXPECT_EQ(exposure_ticks, slot.kind == SlotKind::tracking ? 50u * 125 : 412u * 125);
-        if (slot.kind != SlotKind::basis) continue;
-        // A single-lamp row sets one bit: lamp i's, in word i / 32, counted from the top.
-        const int lamp = slot.row;
-        const int bit = lamp == 3 ? 175 : lamp;
-        for (int b = 0; b < 192; ++b) {
-            uint32_t word;
-            std::memcpy(&word, &bytes[s * record + 16 + size_t(b / 32) * 4], 4);
-            ASSERT_EQ(word >> (31 - b % 32) & 1, b == bit ? 1u : 0u);
-        }
-    }
-}
-
-TEST(Sequence, what_cannot_be_played_is_refused_with_a_remedy) {
-    StageConfig stage = default_stage();
-    SequenceConfig config;
-    config.basis_exposure_us = 463;
-    EXPECT_NE(compile_sequence(config, stage).error().message.find("does not fit"), std::string::npos);
-    config = {};
-    config.tracking_lamps = {5, 162};
-    EXPECT_NE(compile_sequence(config, stage).error().message.find("lamp 162"), std::string::npos);
-    config = {};
-    stage.lamps.resize(20);
-    EXPECT_NE(compile_sequence(config, stage).error().message.find("156 lamps"), std::string::npos);
-    EXPECT_NE(error_of_file("basis = \"none\"\n").find("none"), std::string::npos);
-    EXPECT_NE(error_of_file("cycles = 0\n").find("cycles must be"), std::string::npos);
-    EXPECT_NE(error_of_file("[exposure_us]\nbases = 1\n").find(":2: exposure_us.bases"), std::string::npos);
-    EXPECT_NE(error_of_file("frame_rate_hz = 5000\n").find("does not fit"), std::string::npos);
-}
-
-TEST(Sequence, the_examples_compile) {
-    for (const char* name : {"single", "s159", "hadamard156"}) {
-        const auto config = read_sequence(std::string("examples/sequence_") + name + ".toml");
-        ASSERT_TRUE(config.ok()) << config.error().message;
-        EXPECT_EQ(config->basis, name);
-        EXPECT_TRUE(compile_sequence(*config, default_stage()).ok());
-    }
-}
-
-TEST(Flicker, a_single_lamp_flashes_once_a_cycle_beside_its_tracking) {
-    SequenceConfig config;
-    config.tracking_lamps = {0};
-    const auto sequence = compile_sequence(config, default_stage());
-    const Flicker flicker = measure_flicker(*sequence);
-    const double cycle_us = 180 * 57870 / 125.0;
-    EXPECT_NEAR(flicker.lamps[5].strobe_hz, 1e6 / cycle_us, 1e-6);
-    EXPECT_NEAR(flicker.lamps[5].duty, 412 / cycle_us, 1e-9);
-    EXPECT_NEAR(flicker.lamps[5].longest_dark_us, cycle_us - 412, 1e-6);
-    EXPECT_NEAR(flicker.lamps[0].strobe_hz, 11e6 / cycle_us, 1e-6);
-    // One flash a cycle has every harmonic at twice the mean.
-    EXPECT_NEAR(flicker.worst_lamp.modulation, 2, 1e-9);
-}
-
-TEST(Flicker, a_sine_of_light_is_measured_at_its_own_frequency_and_amplitude) {
-    const Sequence sequence = compile("single");
-    std::vector<double> light;
-    for (int s = 0; s < 180; ++s) light.push_back(10 + 3 * std::cos(2 * std::numbers::pi * 2 * s / 180));
-    const FlickerPeak peak = find_flicker(sequence, light);
-    EXPECT_NEAR(peak.hz, 2 * 125e6 / (180 * 57870.0), 1e-6);
-    EXPECT_NEAR(peak.modulation, 0.3, 1e-9);
-    EXPECT_EQ(find_flicker(sequence, std::vector<double>(180, 0)).modulation, 0);
-    // 120 flashes a second, evenly: nothing in the band.
-    std::vector<double> even(180, 0);
-    for (int s = 0; s < 180; s += 18) even[size_t(s)] = 1;
-    EXPECT_LT(find_flicker(sequence, even).modulation, 1e-12);
-}

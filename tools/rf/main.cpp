@@ -11,6 +11,10 @@ int main(int argc, char** argv) {
     ols::add_info_verb(app, exit_code);
     ols::add_verify_verb(app, exit_code);
     ols::add_export_verb(app, exit_code);
+    ols::add_relight_verb(app, exit_code);
+    ols::add_weights_verb(app, exit_code);
+    ols::add_furnace_verb(app, exit_code);
+    ols::add_compare_verb(app, exit_code);
     CLI11_PARSE(app, argc, argv);
     return exit_code;
 }

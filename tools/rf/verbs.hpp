@@ -10,5 +10,9 @@ namespace ols {
 void add_info_verb(CLI::App& app, int& exit_code);
 void add_verify_verb(CLI::App& app, int& exit_code);
 void add_export_verb(CLI::App& app, int& exit_code);
+void add_relight_verb(CLI::App& app, int& exit_code);
+void add_weights_verb(CLI::App& app, int& exit_code);
+void add_furnace_verb(CLI::App& app, int& exit_code);
+void add_compare_verb(CLI::App& app, int& exit_code);
 
 }  // namespace ols

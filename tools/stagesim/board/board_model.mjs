@@ -82,6 +82,7 @@ export class Board {
     this.#resetCause = null;
     this.#options.log(`reset at tick ${this.tick}: ${cause}`);
     this.#edge(this.tick, 0);
+    this.usbHost.unplug(); // transfers end; the new chip is plugged in when a client connects again
     this.#epoch = this.tick;
     this.#start(cause, kept);
     this.#options.onReset(cause);

@@ -8,11 +8,12 @@ import socket
 import subprocess
 import tempfile
 import time
+import zlib
 
-import wire
-from usb import OK, Usb
+from ols_board import wire
+from ols_board.usb import OK, Usb
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 IMAGE = pathlib.Path(os.environ.get("IMAGE", ROOT / "build/firmware/stage.elf"))
 EMULATOR = ROOT / "tools/stagesim/board/board.mjs"
 
@@ -125,8 +126,6 @@ class Link:
         return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
 
     def load(self, program, chunk_bytes=1000):
-        import zlib
-
         data = wire.program_bytes(program)
         self.ask(wire.LOAD_BEGIN, wire.LOAD_BEGIN_REQUEST.pack(len(program["slots"]), program["chain_bits"],
                                                                program["cycles"], len(data), zlib.crc32(data)))

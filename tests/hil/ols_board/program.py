@@ -2,7 +2,7 @@
 # Programs for the tests: slots as plain dictionaries, which JSON can hold.
 import random
 
-from wire import BASIS, DARK, MATTE, TRACKING
+from ols_board.wire import BASIS, DARK, MATTE, TRACKING
 
 CHAIN_BITS = 176
 LAMPS = 162

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MIT
+// Board on Linux: board.h, player.h, witness.h and transport.h without hardware. Time passes when the test says so, and
+// triggers fire at their scheduled ticks; what PIO makes of the words is not imitated here, but tested on its own.
+#include "board_host.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "board.h"
+#include "fault.h"
+#include "link.h"
+#include "player.h"
+#include "pulse.h"
+#include "stage.h"
+#include "transport.h"
+#include "witness.h"
+
+enum { ANSWER_BYTES_MAX = 1 << 16 };
+
+static struct {
+    uint64_t time_us;
+    uint32_t boots;
+    bool bitten;
+    uint32_t surviving[3];
+    bool pins_connected;
+
+    struct sequence* armed;
+    bool playing;
+    uint64_t start_ticks;
+    uint64_t next_rise_ticks;  // of next_slot, on the board's clock
+    uint32_t next_slot, cycle;
+    uint32_t events;
+    uint32_t stamps[WITNESS_RING_STAMPS];
+    uint32_t stamp_count;
+    bool shifter_starved;
+    uint32_t delay_ticks;
+
+    bool attached;
+    uint32_t session;
+    const uint8_t* incoming;
+    size_t incoming_bytes;
+    uint8_t answer[ANSWER_BYTES_MAX];
+    size_t answer_bytes;
+} board;
+
+static uint64_t now_ticks(void) {
+    return board.time_us * BOARD_TICKS_PER_US;
+}
+
+static void start_firmware(void) {
+    board.boots++;
+    player_stop();
+    fault_init();
+    stage_init();
+}
+
+void board_host_power_up(void) {
+    memset(&board, 0, sizeof board);
+    start_firmware();
+}
+
+void board_host_bite(void) {
+    board.bitten = true;
+    board.attached = false;
+    start_firmware();
+}
+
+static void turn_main_loop(void) {
+    stage_poll(transport_is_attached());
+    link_poll();
+}
+
+// Fires what is due until now.
+static void play(void) {
+    const struct sequence* const sequence = board.armed;
+    while (board.playing && board.next_rise_ticks <= now_ticks()) {
+        const struct sequence_slot* const slot = &sequence->slots[board.next_slot];
+        if (slot->trigger_mask & 1) {
+            const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks;
+            board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
+        }
+        board.next_rise_ticks += slot->period_ticks;
+        if (++board.next_slot < sequence->slot_count) continue;
+        board.next_slot = 0;
+        if (++board.cycle == sequence->cycles) {
+            board.playing = false;
+            board.events |= PLAYER_DONE;
+        }
+    }
+}
+
+void board_host_run_us(uint64_t us) {
+    const uint64_t end_us = board.time_us + us;
+    while (board.time_us < end_us) {
+        board.time_us += end_us - board.time_us < 1000 ? end_us - board.time_us : 1000;
+        play();
+        turn_main_loop();
+    }
+}
+
+void board_host_attach(void) {
+    board.attached = true;
+    board.session++;
+}
+
+void board_host_detach(void) {
+    board.attached = false;
+}
+
+size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* answer, size_t answer_bytes_max) {
+    board.incoming = bytes;
+    board.incoming_bytes = byte_count;
+    board.answer_bytes = 0;
+    do turn_main_loop();
+    while (board.incoming_bytes > 0);
+    const size_t answer_bytes = board.answer_bytes < answer_bytes_max ? board.answer_bytes : answer_bytes_max;
+    memcpy(answer, board.answer, answer_bytes);
+    return answer_bytes;
+}
+
+void board_host_starve_timeline(void) {
+    board.playing = false;
+    board.events |= PLAYER_TIMELINE_STARVED;
+}
+
+void board_host_starve_shifter(void) {
+    board.shifter_starved = true;
+    if (board.playing) board.events |= PLAYER_SHIFTER_STARVED;
+    board.playing = false;
+}
+
+void board_host_delay_triggers(uint32_t ticks) {
+    board.delay_ticks = ticks;
+}
+
+void board_host_corrupt_program(void) {
+    board.armed->patterns[0] ^= 1;
+}
+
+bool board_host_pins_are_connected(void) {
+    return board.pins_connected;
+}
+
+// board.h
+
+void board_dark(void) {
+    board.pins_connected = false;
+}
+
+void board_connect_pins(void) {
+    board.pins_connected = true;
+}
+
+uint64_t board_time_us(void) {
+    return board.time_us;
+}
+
+bool board_was_reset_by_watchdog(void) {
+    return board.bitten;
+}
+
+_Noreturn void board_reset(void) {
+    abort();
+}
+
+void board_remember(const uint32_t words[3]) {
+    memcpy(board.surviving, words, sizeof board.surviving);
+}
+
+void board_recall(uint32_t words[3]) {
+    memcpy(words, board.surviving, sizeof board.surviving);
+}
+
+void board_read_id(uint8_t id[8]) {
+    memcpy(id, "emulated", 8);
+}
+
+uint32_t board_boot_nonce(void) {
+    return board.boots;
+}
+
+// player.h and witness.h
+
+bool player_arm(const struct sequence* sequence) {
+    board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
+    board.events = 0;
+    board_connect_pins();
+    if (!board.shifter_starved) return true;
+    player_stop();
+    return false;
+}
+
+void player_start(void) {
+    board.playing = true;
+    board.start_ticks = now_ticks();
+    board.next_rise_ticks = now_ticks() + SEQUENCE_LATCH_TICKS;
+    board.next_slot = board.cycle = 0;
+}
+
+uint32_t player_take_events(void) {
+    const uint32_t events = board.events;
+    board.events = 0;
+    return events;
+}
+
+void player_stop(void) {
+    board_dark();
+    board.playing = false;
+    board.events = 0;
+}
+
+void witness_arm(void) {
+    board.stamp_count = 0;
+}
+
+void witness_start(void) {
+    // Counts from player_start on, which is the same moment here.
+}
+
+uint32_t witness_count(void) {
+    return board.stamp_count;
+}
+
+uint32_t witness_stamp(uint32_t n) {
+    return board.stamps[n % WITNESS_RING_STAMPS];
+}
+
+// transport.h
+
+bool transport_is_attached(void) {
+    return board.attached;
+}
+
+uint32_t transport_session(void) {
+    return board.session;
+}
+
+size_t transport_receive(uint8_t* bytes) {
+    const size_t byte_count =
+        board.incoming_bytes < TRANSPORT_PACKET_BYTES ? board.incoming_bytes : TRANSPORT_PACKET_BYTES;
+    if (byte_count == 0) return 0;
+    memcpy(bytes, board.incoming, byte_count);
+    board.incoming += byte_count;
+    board.incoming_bytes -= byte_count;
+    return byte_count;
+}
+
+bool transport_can_send(void) {
+    return true;
+}
+
+void transport_send(const uint8_t* bytes, size_t byte_count) {
+    if (board.answer_bytes + byte_count > sizeof board.answer) return;  // like a host that reads no more
+    memcpy(board.answer + board.answer_bytes, bytes, byte_count);
+    board.answer_bytes += byte_count;
+}

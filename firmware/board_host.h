@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// The host's end of board_host.c: what a test does to the board, and what it sees of it.
+#ifndef OLS_BOARD_HOST_H
+#define OLS_BOARD_HOST_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Powers the board up anew: time zero, nothing attached, no fault; then firmware start-up as in main.c.
+void board_host_power_up(void);
+
+// The watchdog bites: start-up again, with what survives a reset.
+void board_host_bite(void);
+
+// Lets time pass and turns the main loop once a millisecond.
+void board_host_run_us(uint64_t us);
+
+// The cable. Attaching starts a new session.
+void board_host_attach(void);
+void board_host_detach(void);
+
+// Bytes to the board, and its answers; the main loop turns until all are taken. Returns the bytes written to `answer`.
+size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* answer, size_t answer_bytes_max);
+
+// Hardware trouble, from now on.
+void board_host_starve_timeline(void);
+void board_host_starve_shifter(void);
+void board_host_delay_triggers(uint32_t ticks);
+void board_host_corrupt_program(void);
+
+// True while pins belong to PIO; false is dark.
+bool board_host_pins_are_connected(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""Relighting against Mitsuba 3, an independent renderer: the same shape under a whole environment map, and relit by `rf` from 156
+single-lamp pictures.
+
+Lamps stand for a map as far as 156 directions can. What they cannot resolve is measured apart: Mitsuba also renders the map
+after each lamp's cell was given its mean radiance. Skipped where mitsuba is not installed
+(`.venv/bin/pip install mitsuba`)."""
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+mi = pytest.importorskip("mitsuba", reason="mitsuba is not installed: .venv/bin/pip install mitsuba")
+mi.set_variant("scalar_rgb")
+
+ROOT = Path(__file__).resolve().parents[2]
+BIN = ROOT / "build/host/bin"
+ASSETS = Path(os.environ.get("OLS_ASSETS", ROOT / ".cache/assets"))
+SIZE = 48
+MAP_HEIGHT = 128
+
+SPHERE = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1, 1, 1]}}}
+
+
+def run(program, *arguments):
+    return subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
+
+
+def write_exr(path, rgb):
+    channels = {name: np.ascontiguousarray(rgb[..., c], dtype=np.float32) for c, name in enumerate("RGB")}
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
+
+
+def read_rgb(path):
+    channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float64)
+
+
+def render(shape, half_width, light, samples, seed=0):
+    """What an orthographic camera on +Z sees, direct light only, box filter: scene-linear SIZE x SIZE x 3."""
+    view = mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
+    view = view @ mi.ScalarTransform4f().scale([half_width, half_width, 1])
+    film = {"type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}, "pixel_format": "rgb"}
+    sensor = {"type": "orthographic", "to_world": view, "film": film}
+    sensor["sampler"] = {"type": "stratified", "sample_count": samples, "seed": seed}
+    # One emitter sample is enough for a single lamp; a map is sampled by its radiance.
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0 if light["type"] == "directional" else 1}
+    integrator["hide_emitters"] = True
+    scene = {"type": "scene", "integrator": integrator, "sensor": sensor, "shape": shape, "light": light}
+    return np.array(mi.render(mi.load_dict(scene), spp=samples, seed=seed)).astype(np.float64)
+
+
+def map_light(rgb):
+    return {"type": "envmap", "bitmap": mi.Bitmap(rgb.astype(np.float32))}
+
+
+def lamp_light(direction):
+    """A lamp of irradiance pi on a facing surface, so that a white Lambertian surface shows r = max(0, n.l)."""
+    light = {"type": "directional", "direction": [float(-v) for v in direction]}
+    light["irradiance"] = {"type": "rgb", "value": [np.pi] * 3}
+    return light
+
+
+def sky(with_sun):
+    """A smooth coloured sky over dark ground, seen from inside: +Z in the middle, +X left of it. A sun adds a third of the light."""
+    height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
+    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
+    longitude = np.pi * (1 - 2 * (np.arange(width) + 0.5) / width)[None, :]
+    up, towards_x = np.sin(latitude), np.cos(latitude) * np.sin(longitude)
+    base = 0.15 + 0.85 / (1 + np.exp(-6 * up))
+    rgb = base[..., None] * np.stack([0.7 + 0.4 * towards_x, 0.8 + 0 * towards_x, 1.0 - 0.3 * towards_x], axis=-1)
+    if with_sun:
+        disc = (np.abs(latitude - 0.7) < 0.04) & (np.abs(longitude - 1.0) < 0.04)
+        steradians = np.cos(latitude) * (np.pi / height) ** 2 * np.ones_like(longitude)
+        rgb[disc] += 0.5 * (rgb * steradians[..., None]).sum(axis=(0, 1)) / steradians[disc].sum()
+    return rgb
+
+
+@pytest.fixture(scope="module")
+def lamps(tmp_path_factory):
+    path = tmp_path_factory.mktemp("lamps") / "white.exr"
+    write_exr(path, np.ones((64, 128, 3)))
+    report = json.loads(run("rf", "weights", "--env", path, "--json"))
+    return np.array([lamp["direction"] for lamp in report["lamps"]])
+
+
+def archive_of(shape, half_width, lamps, folder, samples):
+    """Mitsuba photographs every lamp alone; stagectl takes the pictures in as any photographs."""
+    pictures = folder / "pictures"
+    pictures.mkdir(parents=True)
+    lines = []
+    for i, direction in enumerate(lamps):
+        write_exr(pictures / f"p{i:03}.exr", render(shape, half_width, lamp_light(direction), samples, seed=i))
+        lines.append(f"p{i:03}.exr {direction[0]:.9f} {direction[1]:.9f} {direction[2]:.9f}")
+    (folder / "lights.lp").write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
+    run("stagectl", "ingest", pictures, "--lights", folder / "lights.lp", "-o", folder / "take.rfa")
+    return folder / "take.rfa"
+
+
+def relit(archive, rgb, folder, *options):
+    write_exr(folder / "map.exr", rgb)
+    run("rf", "relight", archive, "--env", folder / "map.exr", "--float", "-o", folder / "relit.exr", *options)
+    return read_rgb(folder / "relit.exr")
+
+
+def cell_means(rgb, lamps):
+    """The map as 156 lamps can know it: each lamp's cell has its mean radiance."""
+    height, width, _ = rgb.shape
+    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
+    longitude = np.pi * (1 - 2 * (np.arange(width) + 0.5) / width)[None, :]
+    directions = np.stack(np.broadcast_arrays(np.cos(latitude) * np.sin(longitude), np.sin(latitude), np.cos(latitude) * np.cos(longitude)))
+    nearest = np.argmax(np.tensordot(lamps, directions, axes=1), axis=0)
+    steradians = np.cos(latitude) * np.ones_like(longitude)
+    area = np.bincount(nearest.ravel(), steradians.ravel(), minlength=len(lamps))
+    means = [np.bincount(nearest.ravel(), (rgb[..., c] * steradians).ravel(), minlength=len(lamps)) / area for c in range(3)]
+    return np.stack(means, axis=-1)[nearest]
+
+
+class Truth:
+    """Two independent renderings, so that Mitsuba's own noise drops out of what is measured against them."""
+
+    def __init__(self, shape, half_width, rgb, samples=96):
+        self.a, self.b = (render(shape, half_width, map_light(rgb), samples, seed) for seed in (1, 2))
+        self.mean = (self.a + self.b) / 2
+
+    def rms_difference(self, got, inside):
+        """Relative to the mean: the errors against two pictures of independent noise multiply to the square of what is
+        common to both, which is the true difference."""
+        square = ((got - self.a) * (got - self.b))[inside].mean()
+        return np.sqrt(max(square, 0)) / self.mean[inside].mean()
+
+    def bias(self, got, inside):
+        return (got - self.mean)[inside].mean() / self.mean[inside].mean()
+
+
+@pytest.fixture(scope="module")
+def sphere_take(lamps, tmp_path_factory):
+    return archive_of(SPHERE, 1.0, lamps, tmp_path_factory.mktemp("sphere"), samples=16)
+
+
+def sphere_inside():
+    axis = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
+    return axis[None, :] ** 2 + axis[:, None] ** 2 < 0.95**2
+
+
+@pytest.mark.parametrize("with_sun", [False, True])
+def test_a_sphere_under_a_sky_is_mitsubas_sphere(sphere_take, tmp_path, lamps, with_sun):
+    rgb = sky(with_sun)
+    got, inside = relit(sphere_take, rgb, tmp_path), sphere_inside()
+    full, at_lamps = Truth(SPHERE, 1.0, rgb), Truth(SPHERE, 1.0, cell_means(rgb, lamps))
+    print(f"rms {full.rms_difference(got, inside):.4f} bias {full.bias(got, inside):+.4f}, of the map at lamp resolution "
+          f"rms {at_lamps.rms_difference(got, inside):.4f} bias {at_lamps.bias(got, inside):+.4f}")
+    # A hard sun is moved to its lamp, up to 10.8 degrees; that is what lamps cannot resolve.
+    assert (at_lamps if with_sun else full).rms_difference(got, inside) < 0.01
+
+
+@pytest.mark.parametrize("u, v", [(0.02, 0.3), (0.25, 0.5), (0.4, 0.2), (0.5, 0.5), (0.62, 0.65), (0.75, 0.5), (0.9, 0.4)])
+def test_one_bright_texel_lights_the_same_side_as_in_mitsuba(sphere_take, tmp_path, u, v):
+    rgb = np.zeros((MAP_HEIGHT, 2 * MAP_HEIGHT, 3))
+    rgb[int(v * MAP_HEIGHT), int(u * 2 * MAP_HEIGHT)] = 1000
+    truth, got = render(SPHERE, 1.0, map_light(rgb), samples=16), relit(sphere_take, rgb, tmp_path)
+
+    def centroid(image):
+        axis = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
+        weight = image[..., 0] / image[..., 0].sum()
+        return np.array([(weight * axis[None, :]).sum(), (weight * axis[:, None]).sum()])
+
+    # A lamp stands at most 10.8 degrees from what it is lit for.
+    assert np.abs(centroid(truth) - centroid(got)).max() < np.radians(10.9)
+
+
+@pytest.mark.skipif(not (ASSETS / "head.obj").exists(), reason="no head.obj: run `make assets`")
+def test_the_head_under_a_real_map_is_mitsubas_head(lamps, tmp_path):
+    shape = mi.load_dict({"type": "obj", "filename": str(ASSETS / "head.obj"), "bsdf": {"type": "twosided", "bsdf": SPHERE["bsdf"]}})
+    take = archive_of(shape, 0.16, lamps, tmp_path / "head", samples=16)
+    for name in ("courtyard", "sunset"):
+        path = next(ASSETS.rglob(f"{name}.exr"))
+        rgb = np.clip(read_rgb(path), 0, None)
+        rgb = rgb.reshape(MAP_HEIGHT, rgb.shape[0] // MAP_HEIGHT, 2 * MAP_HEIGHT, -1, 3).mean(axis=(1, 3))
+        got, full, at_lamps = relit(take, rgb, tmp_path), Truth(shape, 0.16, rgb), Truth(shape, 0.16, cell_means(rgb, lamps))
+        inside = render(shape, 0.16, {"type": "constant"}, samples=16)[..., 0] > 0.05
+        print(f"{name}: rms {full.rms_difference(got, inside):.4f} bias {full.bias(got, inside):+.4f}, of the map at lamp "
+              f"resolution rms {at_lamps.rms_difference(got, inside):.4f} bias {at_lamps.bias(got, inside):+.4f}")
+        assert full.rms_difference(got, inside) < 0.02

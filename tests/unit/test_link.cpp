@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: MIT
+// The firmware's answers to the host's messages, on the board without hardware: loading, playing, and every way to end
+// dark.
+// links: ols_firmware
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "board_host.h"
+#include "frame.h"
+#include "layout_hash.h"
+
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+struct Reply {
+    uint16_t type = 0, id = 0;
+    Bytes payload;
+
+    template <typename T>
+    T as() const {
+        T value{};
+        memcpy(&value, payload.data(), std::min(sizeof value, payload.size()));
+        return value;
+    }
+    bool ok(uint16_t request) const { return type == (request | OLS_REPLY); }
+    uint16_t error() const { return type == (OLS_ERROR | OLS_REPLY) ? as<ols_error_reply>().code : 0; }
+    std::string text() const { return as<ols_error_reply>().text; }
+};
+
+template <typename T>
+Bytes bytes_of(const T& value) {
+    const auto* first = reinterpret_cast<const uint8_t*>(&value);
+    return Bytes(first, first + sizeof value);
+}
+
+class Link : public testing::Test {
+  protected:
+    void SetUp() override {
+        board_host_power_up();
+        board_host_attach();
+    }
+
+    Reply ask(uint16_t type, const Bytes& payload = {}) {
+        uint8_t frame[OLS_FRAME_BYTES_MAX], answer[2 * OLS_FRAME_BYTES_MAX];
+        const size_t bytes = ols_frame_encode(type, ++id_, payload.data(), payload.size(), frame, sizeof frame);
+        const size_t answered = board_host_exchange(frame, bytes, answer, sizeof answer);
+        ols_frame_parser parser{};
+        EXPECT_EQ(ols_frame_parser_write(&parser, answer, answered), answered);
+        ols_frame got{};
+        EXPECT_TRUE(ols_frame_parser_read(&parser, &got));
+        EXPECT_EQ(got.request_id, id_);
+        return {got.type, got.request_id, Bytes(got.payload, got.payload + got.payload_bytes)};
+    }
+
+    ols_status_reply status() { return ask(OLS_STATUS).as<ols_status_reply>(); }
+
+    static Bytes program(int slots, uint32_t period_ticks = 57'870) {
+        Bytes all;
+        for (int n = 0; n < slots; n++) {
+            ols_slot slot{};
+            slot.trigger_mask = 1;
+            slot.exposure_ticks = 50'000;
+            slot.period_ticks = period_ticks;
+            const Bytes header = bytes_of(slot);
+            all.insert(all.end(), header.begin(), header.end());
+            for (int word = 0; word < 6; word++)
+                for (int byte = 0; byte < 4; byte++) all.push_back(word < 5 ? uint8_t(37 * n + word) : 0);
+        }
+        return all;
+    }
+
+    static ols_load_begin begin_for(const Bytes& program, uint32_t cycles) {
+        return {uint16_t(program.size() / 40), 176, cycles, uint32_t(program.size()),
+                ols_crc32(0, program.data(), program.size())};
+    }
+
+    Reply load(const Bytes& program, uint32_t cycles = 1) {
+        EXPECT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program, cycles))).ok(OLS_LOAD_BEGIN));
+        for (size_t offset = 0; offset < program.size(); offset += 1000) {
+            Bytes chunk = bytes_of(ols_load_chunk{uint32_t(offset)});
+            const size_t end = std::min(program.size(), offset + 1000);
+            chunk.insert(chunk.end(), program.begin() + long(offset), program.begin() + long(end));
+            EXPECT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
+        }
+        return ask(OLS_LOAD_END);
+    }
+
+    void play(uint32_t cycles = 0) {
+        ASSERT_TRUE(load(program(18), cycles).ok(OLS_LOAD_END));
+        ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+        ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    }
+
+    void expect_fault(ols_fault cause) {
+        const ols_status_reply now = status();
+        EXPECT_EQ(now.state, OLS_STATE_FAULT);
+        EXPECT_EQ(now.fault, cause);
+        EXPECT_FALSE(board_host_pins_are_connected());
+        for (const uint16_t type : {OLS_ARM, OLS_START, OLS_STOP, OLS_LOAD_END})
+            EXPECT_EQ(ask(type).error(), OLS_ERROR_FAULT_LATCHED) << "until it is cleared";
+        EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_FAULT_LATCHED);
+        EXPECT_TRUE(ask(OLS_CLEAR_FAULT).ok(OLS_CLEAR_FAULT));
+        EXPECT_EQ(status().state, OLS_STATE_IDLE);
+    }
+
+    uint16_t id_ = 0;
+};
+
+TEST_F(Link, hello_tells_layout_and_board) {
+    const Reply reply = ask(OLS_HELLO, bytes_of(ols_hello{OLS_LAYOUT_HASH}));
+    ASSERT_EQ(reply.payload.size(), sizeof(ols_hello_reply));
+    const auto hello = reply.as<ols_hello_reply>();
+    EXPECT_EQ(hello.layout_hash, OLS_LAYOUT_HASH);
+    EXPECT_EQ(hello.tick_hz, 125'000'000u);
+    EXPECT_EQ(hello.chain_bits, 176);
+    EXPECT_EQ(hello.slots_max, 1024);
+}
+
+TEST_F(Link, hello_answers_a_host_of_another_layout_so_that_the_host_can_say_so) {
+    Bytes later = bytes_of(ols_hello{OLS_LAYOUT_HASH + 1});
+    later.resize(40);
+    EXPECT_TRUE(ask(OLS_HELLO, later).ok(OLS_HELLO));
+}
+
+TEST_F(Link, a_program_is_loaded_played_and_logged) {
+    EXPECT_EQ(status().state, OLS_STATE_IDLE);
+    ASSERT_TRUE(load(program(180), 2).ok(OLS_LOAD_END));
+    EXPECT_EQ(status().state, OLS_STATE_LOADED);
+    EXPECT_FALSE(board_host_pins_are_connected());
+    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+    board_host_run_us(100'000);
+    EXPECT_EQ(status().cycles_played, 1u);
+    board_host_run_us(100'000);
+    const ols_status_reply done = status();
+    EXPECT_EQ(done.state, OLS_STATE_DONE);
+    EXPECT_EQ(done.cycles_played, 2u);
+    EXPECT_EQ(done.triggers_fired, 360u);
+    EXPECT_EQ(done.log_entries_lost, 0u);
+    EXPECT_FALSE(board_host_pins_are_connected());
+    uint32_t next = 0;
+    while (next < 360) {
+        const Reply reply = ask(OLS_READ_TRIGGER_LOG, bytes_of(ols_read_trigger_log{next, 100, 0}));
+        const auto header = reply.as<ols_trigger_log_reply>();
+        ASSERT_GT(header.entry_count, 0);
+        ASSERT_EQ(reply.payload.size(), sizeof header + header.entry_count * sizeof(ols_trigger_log_entry));
+        for (int n = 0; n < header.entry_count; n++, next++) {
+            ols_trigger_log_entry entry;
+            memcpy(&entry, reply.payload.data() + sizeof header + size_t(n) * sizeof entry, sizeof entry);
+            EXPECT_EQ(entry.counter, next);
+            EXPECT_EQ(entry.slot, next % 180);
+            EXPECT_EQ(entry.rise_ticks, 12 + uint64_t(next) * 57'870);
+        }
+    }
+}
+
+TEST_F(Link, a_finished_program_can_be_played_again) {
+    play(1);
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().state, OLS_STATE_DONE);
+    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    EXPECT_EQ(status().triggers_fired, 0u);
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().triggers_fired, 18u);
+}
+
+TEST_F(Link, stop_is_dark_at_once) {
+    play();
+    board_host_run_us(5'000);
+    ASSERT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
+    EXPECT_FALSE(board_host_pins_are_connected());
+    EXPECT_EQ(status().state, OLS_STATE_LOADED);
+}
+
+TEST_F(Link, commands_out_of_order_are_refused_and_change_nothing) {
+    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(ask(OLS_START).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(ask(OLS_STOP).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(ask(OLS_LOAD_END).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(ask(OLS_CLEAR_FAULT).error(), OLS_ERROR_BAD_STATE);
+    ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_START).error(), OLS_ERROR_BAD_STATE);
+    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    const Reply refused = ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1)));
+    EXPECT_EQ(refused.error(), OLS_ERROR_BAD_STATE);
+    EXPECT_NE(refused.text().find("stop it before loading"), std::string::npos);
+    board_host_run_us(30'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, a_damaged_program_is_refused_and_gone) {
+    Bytes damaged = program(18);
+    const ols_load_begin begin = begin_for(damaged, 1);
+    damaged[100] ^= 4;
+    ASSERT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin)).ok(OLS_LOAD_BEGIN));
+    Bytes chunk = bytes_of(ols_load_chunk{0});
+    chunk.insert(chunk.end(), damaged.begin(), damaged.end());
+    ASSERT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
+    EXPECT_EQ(ask(OLS_LOAD_END).error(), OLS_ERROR_BAD_CRC);
+    EXPECT_EQ(status().state, OLS_STATE_IDLE);
+    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
+}
+
+TEST_F(Link, an_impossible_program_is_refused_with_its_slot) {
+    Bytes impossible = program(18);
+    impossible[7 * 40 + 8] = impossible[7 * 40 + 9] = impossible[7 * 40 + 10] = 0;  // slot 7: period 0
+    const Reply reply = load(impossible);
+    EXPECT_EQ(reply.error(), OLS_ERROR_BAD_PROGRAM);
+    EXPECT_EQ(reply.as<ols_error_reply>().slot, 7);
+    EXPECT_NE(reply.text().find("slot 7: period must exceed the exposure"), std::string::npos) << reply.text();
+}
+
+TEST_F(Link, chunks_out_of_place_end_the_loading) {
+    const Bytes good = program(18);
+    for (const uint32_t offset : {1u, 720u, 0xffffffffu}) {
+        ASSERT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(good, 1))).ok(OLS_LOAD_BEGIN));
+        Bytes chunk = bytes_of(ols_load_chunk{offset});
+        chunk.resize(300);
+        EXPECT_EQ(ask(OLS_LOAD_CHUNK, chunk).error(), OLS_ERROR_BAD_OFFSET);
+        EXPECT_EQ(ask(OLS_LOAD_CHUNK, chunk).error(), OLS_ERROR_BAD_STATE);
+    }
+    ASSERT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(good, 1))).ok(OLS_LOAD_BEGIN));
+    Bytes too_long = bytes_of(ols_load_chunk{0});
+    too_long.resize(4 + good.size() + 1);
+    EXPECT_EQ(ask(OLS_LOAD_CHUNK, too_long).error(), OLS_ERROR_BAD_OFFSET);
+    ols_load_begin huge = begin_for(good, 1);
+    huge.program_bytes = 0xffffffff;
+    EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(huge)).error(), OLS_ERROR_BAD_PROGRAM);
+}
+
+TEST_F(Link, wrong_lengths_and_unknown_messages_are_refused) {
+    EXPECT_EQ(ask(OLS_HELLO, Bytes(7)).error(), OLS_ERROR_BAD_LENGTH);
+    EXPECT_EQ(ask(OLS_ARM, Bytes(1)).error(), OLS_ERROR_BAD_LENGTH);
+    EXPECT_EQ(ask(OLS_LOAD_CHUNK, Bytes(3)).error(), OLS_ERROR_BAD_LENGTH);
+    EXPECT_EQ(ask(OLS_READ_TRIGGER_LOG, Bytes(9)).error(), OLS_ERROR_BAD_LENGTH);
+    EXPECT_EQ(ask(0x55).error(), OLS_ERROR_UNKNOWN_MESSAGE);
+    EXPECT_EQ(ask(0x4101).error(), OLS_ERROR_UNKNOWN_MESSAGE);
+}
+
+TEST_F(Link, a_starved_timeline_is_a_fault_with_slot_and_tick) {
+    play();
+    board_host_run_us(10'000);
+    board_host_starve_timeline();
+    board_host_run_us(1'000);
+    const ols_status_reply now = status();
+    EXPECT_EQ(now.fault_slot, (10'000 * 125 / 57'870) % 18);
+    EXPECT_NEAR(double(now.fault_ticks), 11'000 * 125, 1000 * 125);
+    expect_fault(OLS_FAULT_TIMELINE_STARVED);
+}
+
+TEST_F(Link, a_starved_shifter_is_a_fault_while_playing_and_arming) {
+    play();
+    board_host_starve_shifter();
+    board_host_run_us(1'000);
+    expect_fault(OLS_FAULT_SHIFTER_STARVED);
+    ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_FAULT_LATCHED);
+    expect_fault(OLS_FAULT_SHIFTER_STARVED);
+}
+
+TEST_F(Link, a_late_trigger_is_a_fault) {
+    play();
+    board_host_run_us(10'000);
+    board_host_delay_triggers(40);
+    board_host_run_us(2'000);
+    expect_fault(OLS_FAULT_SLIPPED);
+}
+
+TEST_F(Link, a_lost_host_is_a_fault_while_armed_and_while_playing_and_none_while_idle) {
+    board_host_detach();
+    board_host_run_us(2'000);
+    board_host_attach();
+    EXPECT_EQ(status().state, OLS_STATE_IDLE);
+    play();
+    board_host_detach();
+    board_host_run_us(1'000);
+    EXPECT_FALSE(board_host_pins_are_connected());
+    board_host_attach();
+    expect_fault(OLS_FAULT_HOST_LOST);
+    ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
+    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    board_host_detach();
+    board_host_run_us(1'000);
+    board_host_attach();
+    expect_fault(OLS_FAULT_HOST_LOST);
+}
+
+TEST_F(Link, a_hang_is_a_fault_with_slot_after_the_reset) {
+    play();
+    board_host_run_us(5'000);
+    const uint32_t nonce = status().boot_nonce;
+    board_host_bite();
+    board_host_attach();
+    const ols_status_reply now = status();
+    EXPECT_NE(now.boot_nonce, nonce);
+    EXPECT_EQ(now.fault_slot, 5'000 * 125 / 57'870);
+    expect_fault(OLS_FAULT_WATCHDOG);
+}
+
+TEST_F(Link, a_program_that_changed_in_memory_is_a_fault) {
+    play(1);
+    board_host_run_us(20'000);
+    board_host_corrupt_program();
+    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_FAULT_LATCHED);
+    expect_fault(OLS_FAULT_BAD_MEMORY);
+}
+
+TEST_F(Link, the_first_fault_stays_latched_when_more_follow) {
+    play();
+    board_host_run_us(5'000);
+    board_host_starve_timeline();
+    board_host_run_us(1'000);
+    board_host_detach();
+    board_host_run_us(5'000);
+    board_host_attach();
+    EXPECT_EQ(status().fault, OLS_FAULT_TIMELINE_STARVED);
+}
+
+TEST_F(Link, half_a_message_of_a_host_that_went_away_does_not_confuse_the_next) {
+    uint8_t frame[64], answer[64];
+    const ols_hello hello{OLS_LAYOUT_HASH};
+    const size_t bytes = ols_frame_encode(OLS_HELLO, 1, &hello, sizeof hello, frame, sizeof frame);
+    EXPECT_EQ(board_host_exchange(frame, bytes / 2, answer, sizeof answer), 0u);
+    board_host_detach();
+    board_host_attach();
+    EXPECT_TRUE(ask(OLS_STATUS).ok(OLS_STATUS));
+}
+
+}  // namespace

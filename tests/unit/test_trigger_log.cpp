@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+// The firmware's trigger log: which slot a trigger was, when it rose, and what is told when some are missed.
+// links: ols_firmware
+#include "trigger_log.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+namespace {
+
+constexpr uint64_t first_rise = 20;  // ticks after start
+
+// Four slots; slot 2 does not fire TRIG0.
+std::unique_ptr<sequence> sequence_of_four() {
+    auto made = std::make_unique<sequence>();
+    made->slot_count = 4;
+    made->slots[0] = {50'000, 1};
+    made->slots[1] = {60'000, 3};
+    made->slots[2] = {70'000, 2};
+    made->slots[3] = {80'000, 1};
+    return made;
+}
+
+uint32_t stamp_at(uint64_t ticks) {
+    return ~uint32_t(ticks / 2);
+}
+
+std::vector<ols_trigger_log_entry> read_all(uint32_t first, ols_trigger_log_reply& header) {
+    std::vector<ols_trigger_log_entry> entries(4096);
+    trigger_log_read(first, 4096, &header, entries.data());
+    entries.resize(header.entry_count);
+    return entries;
+}
+
+TEST(TriggerLog, names_the_slot_and_cycle_of_each_trigger) {
+    const auto played = sequence_of_four();
+    trigger_log_begin(played.get());
+    EXPECT_EQ(trigger_log_slot(), OLS_NO_SLOT);
+    const uint64_t rises[] = {0, 50'000, 180'000, 260'000, 310'000, 440'000};
+    for (const uint64_t rise : rises) EXPECT_TRUE(trigger_log_add(stamp_at(first_rise + rise), rise + 9000));
+    ols_trigger_log_reply header;
+    const auto entries = read_all(0, header);
+    ASSERT_EQ(entries.size(), 6u);
+    const uint16_t slots[] = {0, 1, 3, 0, 1, 3};
+    for (uint32_t n = 0; n < 6; n++) {
+        EXPECT_EQ(entries[n].counter, n);
+        EXPECT_EQ(entries[n].slot, slots[n]);
+        EXPECT_EQ(entries[n].cycle, n / 3);
+        EXPECT_EQ(entries[n].rise_ticks, first_rise + rises[n]);
+    }
+    EXPECT_EQ(entries[1].trigger_mask, 3);
+}
+
+TEST(TriggerLog, notices_a_trigger_that_is_not_where_it_was_scheduled) {
+    for (const int64_t slip : {-1000, -4, 4, 1000}) {
+        const auto played = sequence_of_four();
+        trigger_log_begin(played.get());
+        EXPECT_TRUE(trigger_log_add(stamp_at(20), 30));
+        EXPECT_TRUE(trigger_log_add(stamp_at(50'020 + 2), 50'030)) << "the stamp's resolution is no slip";
+        EXPECT_FALSE(trigger_log_add(stamp_at(uint64_t(180'020 + slip)), 180'030)) << slip;
+    }
+}
+
+TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
+    const auto played = sequence_of_four();
+    trigger_log_begin(played.get());
+    bool on_time = true;
+    uint64_t rise = 20, n = 0;
+    for (const uint64_t periods[] = {50'000, 130'000, 80'000}; on_time && n < 20; n++) {
+        on_time = trigger_log_add(stamp_at(rise), rise + 50);
+        rise += periods[n % 3] + 1;
+    }
+    EXPECT_FALSE(on_time);
+    EXPECT_LE(n, 6u);
+}
+
+TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
+    auto slow = std::make_unique<sequence>();
+    slow->slot_count = 1;
+    slow->slots[0] = {4'000'000'001u, 1};  // 32 s; the stamps wrap every 68.7 s
+    trigger_log_begin(slow.get());
+    for (uint64_t n = 0; n < 20; n++) {
+        const uint64_t rise = first_rise + n * 4'000'000'001u;
+        EXPECT_TRUE(trigger_log_add(stamp_at(rise), rise + (n % 5) * 500'000'000));  // read up to 16 s late
+        ols_trigger_log_reply header;
+        ols_trigger_log_entry entry;
+        trigger_log_read(uint32_t(n), 1, &header, &entry);
+        EXPECT_EQ(entry.rise_ticks, rise / 2 * 2);
+    }
+}
+
+TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
+    auto fast = std::make_unique<sequence>();
+    fast->slot_count = 1;
+    fast->slots[0] = {2000, 1};
+    trigger_log_begin(fast.get());
+    auto fire = [&, n = uint64_t(0)](int count) mutable {
+        for (; count > 0; count--, n++) ASSERT_TRUE(trigger_log_add(stamp_at(n * 2000), n * 2000));
+    };
+    fire(2048);
+    ols_trigger_log_reply header;
+    EXPECT_EQ(read_all(0, header).size(), 2048u);
+    fire(2048);
+    EXPECT_EQ(trigger_log_lost(), 0u) << "all of the first 2048 had been read";
+    fire(100);
+    EXPECT_EQ(trigger_log_lost(), 100u);
+    const auto entries = read_all(2048, header);
+    EXPECT_EQ(header.first_counter, 2148u);
+    EXPECT_EQ(header.next_counter, 4196u);
+    EXPECT_EQ(entries.front().counter, 2148u);
+}
+
+TEST(TriggerLog, skipped_stamps_are_lost_but_the_slots_after_them_are_right) {
+    const auto played = sequence_of_four();
+    trigger_log_begin(played.get());
+    EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
+    trigger_log_skip(3);  // slots 1, 3, 0
+    EXPECT_TRUE(trigger_log_add(stamp_at(20 + 310'000), 310'000));
+    EXPECT_EQ(trigger_log_slot(), 1);
+    EXPECT_EQ(trigger_log_cycle(), 1u);
+    EXPECT_EQ(trigger_log_fired(), 5u);
+    EXPECT_EQ(trigger_log_lost(), 4u) << "three never read from the witness, one never read by the host";
+    ols_trigger_log_reply header;
+    const auto entries = read_all(0, header);
+    ASSERT_EQ(entries.size(), 1u);
+    EXPECT_EQ(entries[0].counter, 4u);
+}
+
+TEST(TriggerLog, reading_past_the_end_gives_nothing) {
+    const auto played = sequence_of_four();
+    trigger_log_begin(played.get());
+    EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
+    ols_trigger_log_reply header;
+    EXPECT_TRUE(read_all(7, header).empty());
+    EXPECT_EQ(header.next_counter, 1u);
+}
+
+}  // namespace

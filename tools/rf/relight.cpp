@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT
+// rf relight: the subject of an archive under an environment map and point lights.
+#include "reflectance/relight.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "archive/archive.hpp"
+#include "image/demosaic.hpp"
+#include "image/exr.hpp"
+#include "image/png.hpp"
+#include "image/tone.hpp"
+#include "lighting.hpp"
+#include "verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct Options {
+    std::string archive, target = "first", output, png;
+    uint32_t camera = 0;
+    LightingOptions lighting;
+    int threads = 0;
+    bool single_float = false, json = false;
+};
+
+// Targets are read in strips of whole tiles of at most this size, so that takes of any size can be relit.
+constexpr size_t strip_bytes = size_t(512) << 20;
+constexpr int tile_rows = 64;
+
+struct RelitTarget {
+    Image image;  // R G B A, premultiplied; alpha is 0 outside the take's mask
+    size_t saturated = 0, missing = 0, outside = 0, clamped = 0;  // pixels with that mask bit
+    size_t left_out_samples = 0;
+    std::vector<int> missing_lamps;
+};
+
+int strip_rows(const Target& head, size_t lamps) {
+    const size_t row_bytes = size_t(head.width) * lamps * head.planes() * sizeof(float);
+    return int(std::max<size_t>(strip_bytes / row_bytes / tile_rows, 1)) * tile_rows;
+}
+
+void count_mask(const std::vector<uint32_t>& mask, RelitTarget& relit) {
+    for (uint32_t bits : mask) {
+        relit.saturated += (bits & mask_saturated) != 0;
+        relit.missing += (bits & mask_missing) != 0;
+        relit.outside += (bits & mask_outside) != 0;
+        relit.clamped += (bits & mask_clamped) != 0;
+    }
+}
+
+Image with_alpha(const Image& rgb, const std::vector<uint32_t>& mask) {
+    Image rgba(rgb.width, rgb.height, 4);
+    for (size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] & mask_outside) continue;
+        std::copy_n(&rgb.data[i * 3], 3, &rgba.data[i * 4]);
+        rgba.data[i * 4 + 3] = 1;
+    }
+    return rgba;
+}
+
+Result<RelitTarget> relight_target(const ArchiveReader& archive, const TargetEntry& entry, const LampWeights& weights,
+                                   int threads) {
+    const auto head = archive.read_head(entry.camera, entry.index);
+    if (!head) return head.error();
+    RelitTarget relit;
+    relit.missing_lamps = head->missing_lamps;
+    Image sum;
+    std::vector<uint32_t> mask;
+    const int rows = strip_rows(*head, archive.info().lights.size());
+    for (int y = 0; y < head->height; y += rows) {
+        const Box box = {0, y, head->width, std::min(rows, head->height - y)};
+        const auto strip = archive.read_box(entry.camera, entry.index, box);
+        if (!strip) return strip.error();
+        auto lit = relight({box.width, box.height, strip->cfa, strip->lamps}, weights, threads);
+        if (!lit) return fail(fmt::format("'{}': {}", entry.file, lit.error().message));
+        if (sum.data.empty()) sum = Image(head->width, head->height, lit->image.channels);
+        std::copy(lit->image.data.begin(), lit->image.data.end(),
+                  sum.data.begin() + std::ptrdiff_t(y) * head->width * sum.channels);
+        mask.insert(mask.end(), strip->mask.begin(), strip->mask.end());
+        for (size_t samples : lit->left_out_samples) relit.left_out_samples += samples;
+    }
+    mask.resize(size_t(head->width) * head->height);
+    count_mask(mask, relit);
+    relit.image = with_alpha(as_rgb(sum, head->cfa), mask);
+    return relit;
+}
+
+// The light of the missing lamps over all light, which the picture lacks.
+double missing_light(const std::vector<int>& lamps, const LampWeights& weights) {
+    double missing = 0, all = 0;
+    for (const Rgb& w : weights.irradiance) all += w[0] + w[1] + w[2];
+    for (int lamp : lamps)
+        for (double w : weights.irradiance[lamp]) missing += w;
+    return all > 0 ? missing / all : 0;
+}
+
+Result<std::vector<TargetEntry>> chosen_targets(const ArchiveReader& archive, const Options& options) {
+    std::vector<TargetEntry> finished;
+    for (const auto& entry : archive.targets())
+        if (entry.camera == options.camera && !entry.file.empty()) finished.push_back(entry);
+    if (finished.empty())
+        return fail(fmt::format("'{}' has no finished target of camera {}: see `rf info {}`", options.archive,
+                                options.camera, options.archive));
+    if (options.target == "all") return finished;
+    if (options.target == "first") return std::vector{finished.front()};
+    for (const auto& entry : finished)
+        if (std::to_string(entry.index) == options.target) return std::vector{entry};
+    return fail(fmt::format("'{}' has no finished target {}: see `rf info {}`", options.archive, options.target,
+                            options.archive));
+}
+
+// out.exr, or out_000012.exr where several targets are written.
+std::string output_name(const std::string& path, const TargetEntry& entry, bool several) {
+    if (!several || path.empty()) return path;
+    const std::filesystem::path p(path);
+    return (p.parent_path() / fmt::format("{}_{:06}{}", p.stem().string(), entry.index, p.extension().string()))
+        .string();
+}
+
+std::map<std::string, std::string> header_attributes(const TakeInfo& info, const Options& options) {
+    return {{"colorInteropID", info.color_interop_id},
+            {"production", info.production},
+            {"scene", info.scene},
+            {"take", info.take},
+            {"relit.valueUnit", info.value_unit},
+            {"relit.environment", std::filesystem::path(options.lighting.environment).filename().string()},
+            {"relit.rotateDegrees", fmt::format("{}", options.lighting.rotate_deg)},
+            {"relit.exposureEV", fmt::format("{}", options.lighting.exposure_ev)}};
+}
+
+void warn(const RelitTarget& relit, const std::string& file, double light_missing) {
+    if (!relit.missing_lamps.empty())
+        fmt::print(stderr, "rf relight: {}: {} lamps are missing, and with them {:.2f} % of the light\n", file,
+                   relit.missing_lamps.size(), 100 * light_missing);
+    if (relit.left_out_samples > 0)
+        fmt::print(stderr, "rf relight: {}: {} samples are NaN or Inf and were left out\n", file,
+                   relit.left_out_samples);
+}
+
+Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const TargetEntry& entry,
+                                         const Lighting& lighting, const Options& options, bool several) {
+    auto relit = relight_target(archive, entry, lighting.weights, options.threads);
+    if (!relit) return relit.error();
+    const double light_missing = missing_light(relit->missing_lamps, lighting.weights);
+    warn(*relit, entry.file, light_missing);
+    const auto output = output_name(options.output, entry, several), png = output_name(options.png, entry, several);
+    const auto written =
+        write_exr(output, relit->image, options.single_float ? ExrType::single_float : ExrType::half_float,
+                  header_attributes(archive.info(), options));
+    if (!written) return written.error();
+    if (!png.empty()) {
+        const auto shown = write_png_preview(png, relit->image);
+        if (!shown) return shown.error();
+    }
+    return nlohmann::json{{"camera", entry.camera},
+                          {"target", entry.index},
+                          {"output", output},
+                          {"png", png},
+                          {"missing_lamps", relit->missing_lamps},
+                          {"missing_light", light_missing},
+                          {"left_out_samples", relit->left_out_samples},
+                          {"masked_pixels",
+                           {{"saturated", relit->saturated},
+                            {"missing", relit->missing},
+                            {"outside", relit->outside},
+                            {"clamped", relit->clamped}}}};
+}
+
+Status run(const Options& options) {
+    const auto archive = ArchiveReader::open(options.archive);
+    if (!archive) return archive.error();
+    const auto cells = cells_of_lights(archive->info().lights);
+    if (!cells) return fail("'" + options.archive + "': " + cells.error().message);
+    const auto targets = chosen_targets(*archive, options);
+    if (!targets) return targets.error();
+    const auto lighting = make_lighting(options.lighting, *cells);
+    if (!lighting) return lighting.error();
+    for (const auto& warning : lighting->warnings) fmt::print(stderr, "rf relight: {}\n", warning);
+    nlohmann::json report = lighting->report;
+    report["archive"] = options.archive;
+    report["lamps"] = cells->size();
+    for (const auto& entry : *targets) {
+        const auto done = relight_and_write(*archive, entry, *lighting, options, options.target == "all");
+        if (!done) return done.error();
+        report["targets"].push_back(*done);
+        if (!options.json) fmt::print("{}\n", (*done)["output"].get<std::string>());
+    }
+    if (options.json) fmt::print("{}\n", report.dump(1));
+    return Done{};
+}
+
+}  // namespace
+
+void add_relight_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("relight", "show a take's subject under other light");
+    verb->footer(
+        fmt::format("Example: rf relight take.rfa --env sunset.exr --rotate 90 -o relit.exr --png relit.png\n"
+                    "The OpenEXR file is scene-linear; a white surface under radiance 1 from everywhere is 1.\n"
+                    "The PNG's tone curve: {}.",
+                    tone_curve_text));
+    verb->add_option("archive", options->archive, "take.rfa")->required();
+    options->lighting.add_to(*verb);
+    verb->add_option("--target", options->target, "number, `first` or `all` (then file names get _NNNNNN)")
+        ->type_name("N");
+    verb->add_option("--camera", options->camera, "camera of the targets")->type_name("N");
+    verb->add_option("-o,--output", options->output, "OpenEXR file to write (R G B A)")->required();
+    verb->add_option("--png", options->png, "8-bit preview to write");
+    verb->add_flag("--float", options->single_float, "32-bit samples instead of 16-bit halves");
+    verb->add_option("--threads", options->threads, "0: one a core; the result is the same for any number")
+        ->check(CLI::Range(0, 1024));
+    verb->add_flag("--json", options->json, "print a JSON report");
+    verb->callback([options, &exit_code] {
+        const auto status = run(*options);
+        if (status) return;
+        fmt::print(stderr, "rf relight: {}\n", status.error().message);
+        exit_code = 1;
+    });
+}
+
+}  // namespace ols
