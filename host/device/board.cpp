@@ -58,7 +58,8 @@ std::string fault_text(const ols_status_reply& status) {
             text = "bad_memory: the program in memory changed; load it again, and check the power supply";
             break;
     }
-    const std::string slot = status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
+    const std::string slot =
+        status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
     return fmt::format("{} (at tick {}{})", text, uint64_t(status.fault_ticks), slot);
 }
 
