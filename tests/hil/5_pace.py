@@ -47,6 +47,18 @@ def test_in_virtual_pace_a_slow_reader_holds_the_board_back_and_loses_nothing(em
     assert board.stop()["dropped"] == 0
 
 
+def test_a_board_that_is_held_back_still_answers(emulated):
+    board = emulated(exposures=True)
+    link = board.plug()
+    link.play(paper_program(cycles=0))
+    time.sleep(1.0)
+    before = link.status()["triggers_fired"]
+    time.sleep(0.5)
+    after = link.status()["triggers_fired"]
+    # Nobody reads exposures: the board moves by what the answer needs, 50 ms at most, and no further.
+    assert 0 <= after - before <= 0.05 * 125_000_000 / PERIOD_TICKS + 1
+
+
 def test_in_wall_pace_the_board_is_not_faster_than_the_clock_and_counts_what_nobody_took(emulated):
     slots = 540
     board = emulated("--pace", "wall", exposures=True)

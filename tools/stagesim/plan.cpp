@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int reduction = 8, lamp_stride = 9;
+constexpr int reduction = 4, lamp_stride = 9;
 
 json effects_json(const EffectSet& effects) {
     json rows = json::array();

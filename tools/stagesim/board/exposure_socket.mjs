@@ -3,12 +3,13 @@
 // stage").
 import { connect } from 'node:net';
 
+const END_MS = 2000;
+
 export class ExposureSocket {
   #socket;
   #dropOnFull;
   #full = false;
   #closed = false;
-  #onDrain = () => {};
 
   /**
    * @param {import('node:net').Socket} socket
@@ -18,9 +19,11 @@ export class ExposureSocket {
     this.#socket = socket;
     this.#dropOnFull = dropOnFull;
     this.dropped = 0;
+    /** Called when the reader has caught up, or has gone. */
+    this.onReady = () => {};
     const drained = () => {
       this.#full = false;
-      this.#onDrain();
+      this.onReady();
     };
     socket.on('drain', drained);
     socket.on('close', () => {
@@ -39,18 +42,7 @@ export class ExposureSocket {
     });
   }
 
-  get closed() {
-    return this.#closed;
-  }
-
-  /** Resolves when the reader has caught up, or has gone. */
-  ready() {
-    if (!this.#full || this.#closed) return Promise.resolve();
-    return new Promise((resolve) => {
-      this.#onDrain = resolve;
-    });
-  }
-
+  /** True while the reader is behind. */
   get full() {
     return this.#full && !this.#closed;
   }
@@ -64,10 +56,11 @@ export class ExposureSocket {
     this.#full = !this.#socket.write(`${JSON.stringify(message)}\n`);
   }
 
-  /** Says the end, whatever is full, and resolves once all is written or the reader has gone. */
+  /** Says the end and resolves once all is written, the reader has gone, or has not read for two seconds. */
   end() {
     return new Promise((resolve) => {
       this.#socket.once('close', resolve);
+      setTimeout(() => this.#socket.destroy(), END_MS).unref();
       if (this.#closed) resolve();
       else this.#socket.end(`${JSON.stringify({ type: 'end' })}\n`, () => this.#socket.destroy());
     });

@@ -6,6 +6,8 @@ import { setTimeout as sleep } from 'node:timers/promises';
 const TICKS_PER_MS = 125_000;
 const SLICE_TICKS = TICKS_PER_MS; // also the longest gap between "now" lines
 const SETTLE_TICKS = 8 * TICKS_PER_MS; // quiet for so long, or nothing more happens: a suspend needs 3 ms
+const GRANT_TICKS = 50 * TICKS_PER_MS; // for a request to be answered: the firmware looks every millisecond
+const FOREVER_MS = 0x7fffffff; // the longest timer there is
 const AWAKE_FRACTION = 0.1; // a processor that only wakes for ticks and frames is idle
 
 /**
@@ -13,6 +15,9 @@ const AWAKE_FRACTION = 0.1; // a processor that only wakes for ticks and frames 
  * the device, time passes no faster than the wall clock, so that a time-out or a timer can come. When nothing waits
  * either, time stands still until a client does something: an idle board costs no processor time, its watchdog cannot
  * run out, and ticks do not depend on how long a user pauses.
+ *
+ * While the reader of exposures is behind, time stands still too, but for a short while after each request: the reader
+ * may be waiting for a program that waits for the board's answer.
  */
 export class Pacer {
   #board;
@@ -23,6 +28,7 @@ export class Pacer {
   #wake = () => {};
   #woken = false;
   #quietSince = null;
+  #grantedUntil = 0; // tick to which a request lets time go on
   #startWall_ns = process.hrtime.bigint();
   #startTick;
   #running_ns = 0n;
@@ -41,12 +47,18 @@ export class Pacer {
     this.#limit = ticksLimit;
     this.#stage = stage;
     this.#startTick = board.tick;
+    if (stage) stage.onReady = () => this.#resume();
   }
 
   /** Something has come in from a client: time goes on. */
   wake() {
-    this.#woken = true;
     this.#quietSince = null;
+    this.#grantedUntil = this.#board.tick + GRANT_TICKS;
+    this.#resume();
+  }
+
+  #resume() {
+    this.#woken = true;
     this.#wake();
   }
 
@@ -66,11 +78,16 @@ export class Pacer {
   /** Runs until stopped or out of ticks. */
   async run() {
     while (!this.#stopped && this.#board.tick < this.#limit) {
-      if (this.#pace === 'virtual' && this.#stage?.full) await this.#stage.ready();
+      while (this.#heldBack) await this.#sleep(FOREVER_MS);
       this.#slice();
       if (this.#pace === 'wall') await this.#followWall();
       else await this.#rest();
     }
+  }
+
+  get #heldBack() {
+    if (this.#pace === 'wall' || this.#stopped || !this.#stage?.full) return false;
+    return !this.#board.usbHost.pending || this.#board.tick >= this.#grantedUntil;
   }
 
   #slice() {
@@ -89,19 +106,9 @@ export class Pacer {
   /** Lets sockets be served, and sleeps as long as there is nothing to do. */
   async #rest() {
     const settled = this.#quietSince !== null && this.#board.tick - this.#quietSince >= SETTLE_TICKS;
-    if (!settled) {
-      await new Promise(setImmediate);
-    } else if (this.#board.usbHost.pending) {
-      await this.#sleep(SLICE_TICKS / TICKS_PER_MS);
-    } else if (!this.#endsByItself) {
-      await this.#sleep(Infinity);
-    }
-    this.#woken = false;
-  }
-
-  /** With a limit of ticks and no client, time has to go on to reach it. */
-  get #endsByItself() {
-    return this.#limit !== Infinity;
+    if (settled && this.#board.usbHost.pending) await this.#sleep(SLICE_TICKS / TICKS_PER_MS);
+    else if (settled && this.#limit === Infinity) await this.#sleep(FOREVER_MS);
+    else await new Promise(setImmediate); // also to reach a limit of ticks
   }
 
   async #followWall() {
@@ -112,14 +119,18 @@ export class Pacer {
     this.#lag_ns = Math.max(this.#lag_ns, wall_ns - board_ns);
   }
 
-  #sleep(ms) {
-    if (this.#woken || this.#stopped) return Promise.resolve();
-    return new Promise((resolve) => {
-      const timer = ms === Infinity ? setInterval(() => {}, 1 << 30) : setTimeout(resolve, ms);
-      this.#wake = () => {
-        clearTimeout(timer);
-        resolve();
-      };
-    });
+  /** Until something has come in, at most `ms`. */
+  async #sleep(ms) {
+    if (!this.#woken && !this.#stopped) {
+      await new Promise((resolve) => {
+        const timer = setTimeout(resolve, ms);
+        this.#wake = () => {
+          clearTimeout(timer);
+          resolve();
+        };
+      });
+    }
+    this.#wake = () => {};
+    this.#woken = false;
   }
 }

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// stagectl ingest: a folder of photographs and an .lp file become an archive.
+#include "archive/ingest.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "stagectl/verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct Options {
+    IngestOptions ingest;
+    bool json = false;
+};
+
+void show_progress(int done, int total) {
+    fmt::print(stderr, "\rreading pictures {}/{}{}", done, total, done == total ? "\n" : "");
+}
+
+Status run(Options& options) {
+    if (isatty(STDERR_FILENO)) options.ingest.progress = show_progress;
+    const auto report = ingest(options.ingest);
+    if (!report) return report.error();
+    if (options.json) {
+        const nlohmann::json json = {{"output", options.ingest.output}, {"lamps", report->lamps},
+                                     {"width", report->width},          {"height", report->height},
+                                     {"color", report->color},          {"unused", report->unused}};
+        fmt::print("{}\n", json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace));
+        return Done{};
+    }
+    fmt::print("{}: {} lamps, {} x {}, {}\n", options.ingest.output, report->lamps, report->width, report->height,
+               report->color ? "RGB" : "grey");
+    if (!report->unused.empty())
+        fmt::print("{} pictures of the folder are not in the .lp file and were not used, '{}' the first\n",
+                   report->unused.size(), report->unused.front());
+    return Done{};
+}
+
+}  // namespace
+
+void add_ingest_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<Options>();
+    IngestOptions& ingest = options->ingest;
+    CLI::App* verb = app.add_subcommand("ingest", "make an archive from photographs, one a lamp, and an .lp file");
+    verb->footer(
+        "Example: stagectl ingest photos/ --lights photos/lights.lp -o take.rfa\n"
+        "PNG, JPEG, TIFF, TGA and OpenEXR, grey or RGB, all of one size. Values are stored as linear light, full scale "
+        "1. On any error nothing is written.");
+    verb->add_option("folder", ingest.directory, "folder of the pictures")->required();
+    verb->add_option("--lights", ingest.lights, ".lp file: the count, then `picture x y z` a line, in any order")
+        ->required();
+    verb->add_option("-o,--output", ingest.output, "archive to make (take.rfa)")->required();
+    verb->add_option("--mask", ingest.mask, "picture that is white where the subject is");
+    const std::map<std::string, Transfer> transfers = {{"srgb", Transfer::srgb}, {"linear", Transfer::linear}};
+    verb->add_option("--transfer", ingest.transfer, "how values are coded (default: integers srgb, floats linear)")
+        ->transform(CLI::CheckedTransformer(transfers).description(""))
+        ->type_name("srgb|linear");
+    verb->add_flag_callback(
+        "--float", [&ingest] { ingest.sample_type = SampleType::single_float; }, "32-bit samples, not 16-bit halves");
+    verb->add_flag_callback(
+        "--zips", [&ingest] { ingest.compression = Compression::zips; }, "compress without loss");
+    verb->add_option("--production", ingest.production, "slate: production");
+    verb->add_option("--scene", ingest.scene, "slate: scene");
+    verb->add_option("--take", ingest.take, "slate: take");
+    verb->add_option("--notes", ingest.notes, "slate: notes");
+    verb->add_flag("--overwrite", ingest.overwrite, "replace an archive of this name");
+    verb->add_flag("--json", options->json, "print a JSON report");
+    verb->callback([options, &exit_code] {
+        const auto status = run(*options);
+        if (status) return;
+        fmt::print(stderr, "stagectl ingest: {}\n", status.error().message);
+        exit_code = 1;
+    });
+}
+
+}  // namespace ols
