@@ -11,64 +11,64 @@ import re
 import numpy as np
 import OpenEXR
 
-CFA_RGGB = np.array([[0, 1], [1, 2]])
+RGGB = np.array([[0, 1], [1, 2]])  # 0 red, 1 green, 2 blue
 
 
-def read_lamps(path):
-    """Lamp layers of an archive's target: (lamps, planes, height, width)."""
+def read_target(path):
+    """Lamp layers of an archive's target as (lamps, planes, height, width), and its mask as (height, width)."""
+    channels, mask = {}, None
     with OpenEXR.File(str(path), separate_channels=True) as file:
-        channels = {}
         for part in file.parts:
             for name, channel in part.channels.items():
                 match = re.match(r"lamp_(\d+)\.([YRGB])$", name)
                 if match:
                     channels[int(match[1]), "YRGB".index(match[2])] = channel.pixels
+                elif part.name() == "mask":
+                    mask = channel.pixels
     lamps = sorted({lamp for lamp, _ in channels})
     planes = sorted({plane for _, plane in channels})
-    return np.stack([np.stack([channels[lamp, plane] for plane in planes]) for lamp in lamps]).astype(np.float32)
+    return np.stack([np.stack([channels[lamp, plane] for plane in planes]) for lamp in lamps]).astype(np.float32), mask
 
 
-def read_plane(path):
+def read_image(path):
+    """A one-part OpenEXR picture as (height, width) or (height, width, channels R G B ...)."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
-        return next(iter(file.parts[0].channels.values())).pixels.astype(np.float64)
+        channels = file.parts[0].channels
+        names = [name for name in "RGB" if name in channels] or list(channels)
+        planes = [channels[name].pixels.astype(np.float64) for name in names]
+    return planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
 
 
-def mosaic(rgb, height, width):
-    """(..., 3, height, width) sampled as an RGGB camera does: (..., height, width)."""
-    color = np.tile(CFA_RGGB, (height // 2, width // 2))
-    return np.take_along_axis(rgb, np.broadcast_to(color, rgb.shape[:-3] + (1, height, width)), axis=-3)[..., 0, :, :]
+def psnr_db(image, truth):
+    """Peak is the truth's maximum."""
+    return float(10 * np.log10(truth.max() ** 2 / np.mean((image - truth) ** 2)))
 
 
-def compare(noisy_target, clean_target, flat, basis_rows, irradiance, exposure_us, noise):
-    """Measured and predicted rms noise of the relit mosaic, and both as PSNR with the clean picture's maximum as peak.
+def compare(noisy_target, clean_target, flat, basis_rows, irradiance, exposure_us, read, shot):
+    """Measured and predicted rms noise of the relit mosaic over its unmasked samples.
 
-    basis_rows: (slots, lamps) 0/1; irradiance: (lamps, 3); flat: counts per microsecond for r = 1; noise: read, shot.
+    basis_rows: (slots, lamps) 0/1; irradiance: (lamps, 3); flat: counts per microsecond for r = 1; read, shot: noise model.
     """
-    noisy = read_lamps(noisy_target)[:, 0]
-    height, width = noisy.shape[1:]
-    clean = mosaic(read_lamps(clean_target), height, width)
-    color = np.tile(CFA_RGGB, (height // 2, width // 2))
-
-    counts_per_r = flat * exposure_us
-    error = np.zeros((height, width))
-    picture = np.zeros((height, width))
-    variance = np.zeros((height, width))
-    # Mean counts of every slot, lit lamps added up; P is rows x lamps.
-    slots = np.einsum("jl,lyx->jyx", basis_rows.astype(np.float32), clean, optimize=True) * counts_per_r
-    sigma2 = (noise["read"] + noise["shot"] * np.sqrt(np.maximum(slots, 0))) ** 2 + 1 / 12
+    noisy, mask = read_target(noisy_target)
+    clean, _ = read_target(clean_target)
+    height, width = mask.shape
+    color = np.tile(RGGB, (height // 2, width // 2))
+    error2, variance, peak, samples = 0.0, 0.0, 0.0, 0
     for channel in range(3):
-        here = color == channel
+        here = (color == channel) & (mask == 0)
+        counts_per_r = flat[here] * exposure_us
+        lamps = clean[:, channel][:, here].astype(np.float64)
         weight = irradiance[:, channel] / np.pi
         c = np.linalg.lstsq(basis_rows.T.astype(float), weight, rcond=None)[0]
-        picture[here] = np.tensordot(weight, clean[:, here], axes=1)
-        error[here] = np.tensordot(weight, noisy[:, here], axes=1) - picture[here]
-        variance[here] = np.tensordot(c**2, sigma2[:, here], axes=1) / counts_per_r[here] ** 2
-    peak = picture.max()
-    rms, predicted = np.sqrt(np.mean(error**2)), np.sqrt(np.mean(variance))
+        slots = np.maximum(basis_rows.astype(float) @ lamps * counts_per_r, 0)
+        sigma2 = (read + shot * np.sqrt(slots)) ** 2 + 1 / 12
+        truth = weight @ lamps
+        error2 += np.sum((weight @ noisy[:, 0][:, here] - truth) ** 2)
+        variance += np.sum(c**2 @ sigma2 / counts_per_r**2)
+        peak, samples = max(peak, truth.max()), samples + truth.size
     return {
-        "rms": float(rms),
-        "rms_predicted": float(predicted),
-        "ratio": float(rms / predicted),
-        "psnr_db": float(20 * np.log10(peak / rms)),
-        "psnr_predicted_db": float(20 * np.log10(peak / predicted)),
+        "mosaic_psnr_db": round(float(10 * np.log10(peak**2 * samples / error2)), 2),
+        "mosaic_psnr_predicted_db": round(float(10 * np.log10(peak**2 * samples / variance)), 2),
+        "noise_over_prediction": round(float(np.sqrt(error2 / variance)), 4),
+        "masked_fraction": round(1 - samples / mask.size, 5),
     }
