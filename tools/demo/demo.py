@@ -99,7 +99,7 @@ class Demo:
         """What the noise model says of the noisy takes, before demosaicing, where it is exact."""
         weights = run_json(BIN / "rf", "weights", "--env", environment(TRUTH_ENVIRONMENT), "--json")
         irradiance = np.array([lamp["irradiance"] for lamp in weights["lamps"]])
-        flat = noise.read_image(self.out / "calibration_clean/cam0/flat.exr")
+        flat = noise.read_image(self.out / "calibration_noisy/cam0/flat.exr")
         figures = {}
         with self.clock("compare noise with its model"):
             for basis in COMPARED:
