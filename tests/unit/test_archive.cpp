@@ -224,7 +224,13 @@ TEST_F(Archive, an_existing_path_is_refused_and_only_an_archive_is_overwritten) 
     const auto refused = ArchiveWriter::create(path, take_info(1));
     ASSERT_FALSE(refused.ok());
     EXPECT_NE(refused.error().message.find(path), std::string::npos);
+    {
+        auto overwritten = ArchiveWriter::create(path, take_info(1), true);
+        ASSERT_TRUE(overwritten->write_target(numbered_target(1, 8, 8, Cfa::none, 0)).ok());
+        std::ofstream(path + "/cam0/target_000001.exr.part") << "interrupted";
+    }
     EXPECT_TRUE(ArchiveWriter::create(path, take_info(1), true).ok());
+    EXPECT_FALSE(std::filesystem::exists(path + "/cam0"));
 
     std::ofstream(path + "/my notes.txt") << "keep me";
     const auto stranger = ArchiveWriter::create(path, take_info(1), true);
