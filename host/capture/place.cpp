@@ -156,6 +156,7 @@ void FramePlacer::give_up_oldest(size_t count, const std::string& why) {
     for (; count > 0 && !unlocked_.empty(); --count) {
         refuse(unlocked_.front().frame, why);
         unlocked_.pop_front();
+        if (!unlocked_.empty()) unlocked_.front().gap = why;
     }
 }
 
