@@ -70,7 +70,7 @@ void print_report(const TakeReport& report, const Options& options) {
                    record.unfit_frame);
     if (report.saturated_share > 0)
         fmt::print(stderr,
-                   "stagectl: {:.2f} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
+                   "stagectl: {:.2g} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
                    report.saturated_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (record.slots_missing > 0)
