@@ -172,7 +172,7 @@ void board_recall(uint32_t words[3]) {
 }
 
 void board_read_id(uint8_t id[8]) {
-    memcpy(id, "emulated", 8);
+    memcpy(id, "no-flash", 8);
 }
 
 uint32_t board_boot_nonce(void) {

@@ -63,7 +63,7 @@ static void start_feed(const struct feed* feed, const uint32_t* table, uint32_t 
 }
 
 static void stop_feed(const struct feed* feed) {
-    // Disabled first, lest one restarts the other during the abort (erratum RP2040-E13 asks for the same).
+    // Disabled first, lest one restarts the other during the abort.
     DMA_AL1_CTRL(feed->restart_channel) = 0;
     DMA_AL1_CTRL(feed->table_channel) = 0;
     DMA_CHAN_ABORT = 1u << feed->table_channel | 1u << feed->restart_channel;

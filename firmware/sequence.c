@@ -100,10 +100,12 @@ static bool reject(struct ols_error_reply* error, uint16_t slot, const char* rea
     return false;
 }
 
-static bool pattern_bit_is_set_past(const uint32_t* words, uint16_t word_count, uint16_t bits) {
-    for (uint32_t bit = bits; bit < word_count * 32u; bit++)
-        if (words[bit / 32] >> (31 - bit % 32) & 1) return true;
-    return false;
+static bool pattern_is_empty_from(const uint32_t* words, uint16_t word_count, uint16_t first_bit) {
+    for (uint32_t word = first_bit / 32; word < word_count; word++) {
+        const uint32_t before = word == first_bit / 32u ? first_bit % 32 : 0;
+        if (words[word] << before) return false;
+    }
+    return true;
 }
 
 static bool check_slot(const struct sequence_board* board, const struct ols_slot* slot, const uint32_t* pattern,
@@ -122,9 +124,9 @@ static bool check_slot(const struct sequence_board* board, const struct ols_slot
         return reject(error, number, "period must exceed the exposure by at least ", gap_ticks, " ticks");
     if (slot->period_ticks < shortest_ticks)
         return reject(error, number, "period must be at least ", shortest_ticks, " ticks, to send the next pattern");
-    if (pattern_bit_is_set_past(pattern, words, board->chain_bits))
+    if (!pattern_is_empty_from(pattern, words, board->chain_bits))
         return reject(error, number, "the pattern has bits past the end of the chain of ", board->chain_bits, " bits");
-    if (slot->kind == OLS_DARK && pattern_bit_is_set_past(pattern, words, 0))
+    if (slot->kind == OLS_DARK && !pattern_is_empty_from(pattern, words, 0))
         return reject(error, number, "a dark slot must have an empty pattern of ", board->chain_bits, " zeros");
     return true;
 }

@@ -177,11 +177,10 @@ static void reply_with_descriptor(uint16_t value, uint16_t requested) {
 
 static void clear_halt(uint16_t endpoint) {
     // Restarts the data toggle (USB 2.0 9.4.5); these endpoints never halt, so that is all.
-    if (endpoint == ENDPOINT_OUT && !received) {
-        out_toggle = false;
-        accept_packet();
-    }
     if (endpoint == (0x80 | ENDPOINT_IN)) in_toggle = false;
+    if (endpoint != ENDPOINT_OUT) return;
+    out_toggle = false;
+    if (configured && !received) accept_packet();  // else when the packet at hand has been taken
 }
 
 static void handle_setup(void) {
@@ -241,11 +240,12 @@ void usb_poll(void) {
         new_address = 0;
         reset_endpoints();
     }
+    // Before setup packets: a finished SET_ADDRESS takes effect before what is asked next.
+    if (USB_BUFF_STATUS) handle_done_buffers();
     if (status & USB_SIE_SETUP_REC) {
         USB_SIE_STATUS_CLEAR = USB_SIE_SETUP_REC;
         handle_setup();
     }
-    if (USB_BUFF_STATUS) handle_done_buffers();
 }
 
 bool transport_is_attached(void) {

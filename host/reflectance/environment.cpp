@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <opencv2/imgcodecs.hpp>
 
@@ -51,6 +52,7 @@ double angular_solid_angle(const EnvPatch& patch) {
 }
 
 Result<Image> read_radiance_hdr(const std::string& path) {
+    if (!std::filesystem::exists(path)) return fail("cannot open environment map '" + path + "': check the path");
     const cv::Mat bgr = cv::imread(path, cv::IMREAD_UNCHANGED);
     if (bgr.empty() || bgr.type() != CV_32FC3)
         return fail("cannot read '" + path +

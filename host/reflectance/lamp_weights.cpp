@@ -98,6 +98,17 @@ LampWeights integrate_environment(const Environment& environment, const SphereCe
     return weights;
 }
 
+double share_of_light(const LampWeights& weights, const std::vector<int>& lamps) {
+    const auto light = [&](int lamp) {
+        const Rgb& w = weights.irradiance[lamp];
+        return w[0] + w[1] + w[2];
+    };
+    double all = 0, some = 0;
+    for (int lamp = 0; lamp < int(weights.irradiance.size()); ++lamp) all += light(lamp);
+    for (int lamp : lamps) some += light(lamp);
+    return all > 0 ? some / all : 0;
+}
+
 int add_point_light(const PointLight& light, const SphereCells& cells, LampWeights& weights) {
     const int lamp = cells.nearest(light.direction);
     for (int c = 0; c < 3; ++c) weights.irradiance[lamp][c] += std::numbers::pi * light.color[c];

@@ -33,6 +33,9 @@ struct EnvironmentOptions {
 LampWeights integrate_environment(const Environment& environment, const SphereCells& cells,
                                   const EnvironmentOptions& options = {});
 
+// What some lamps give of all lamps' light, 0..1, red, green and blue together: what a picture lacks without them.
+double share_of_light(const LampWeights& weights, const std::vector<int>& lamps);
+
 struct PointLight {
     Vec3 direction;  // towards the light; any length
     Rgb color;       // irradiance on a surface facing the light, over pi: what a white Lambertian surface there shows

@@ -4,40 +4,23 @@ single-lamp pictures.
 
 Lamps stand for a map as far as 156 directions can. What they cannot resolve is measured apart: Mitsuba also renders the map
 after each lamp's cell was given its mean radiance. Skipped where mitsuba is not installed
-(`.venv/bin/pip install mitsuba`)."""
+(`.venv/bin/pip install mitsuba`); the head comes from `make assets` or the folder OLS_ASSETS."""
 import json
 import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 import pytest
+from pictures import ROOT, ingested, read_exr, run, write_exr
 
 mi = pytest.importorskip("mitsuba", reason="mitsuba is not installed: .venv/bin/pip install mitsuba")
 mi.set_variant("scalar_rgb")
 
-ROOT = Path(__file__).resolve().parents[2]
-BIN = ROOT / "build/host/bin"
 ASSETS = Path(os.environ.get("OLS_ASSETS", ROOT / ".cache/assets"))
 SIZE = 48
 MAP_HEIGHT = 128
 
 SPHERE = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1, 1, 1]}}}
-
-
-def run(program, *arguments):
-    return subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
-
-
-def write_exr(path, rgb):
-    channels = {name: np.ascontiguousarray(rgb[..., c], dtype=np.float32) for c, name in enumerate("RGB")}
-    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
-
-
-def read_rgb(path):
-    channels = OpenEXR.File(str(path), separate_channels=True).channels()
-    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float64)
 
 
 def render(shape, half_width, light, samples, seed=0):
@@ -90,21 +73,14 @@ def lamps(tmp_path_factory):
 
 def archive_of(shape, half_width, lamps, folder, samples):
     """Mitsuba photographs every lamp alone; stagectl takes the pictures in as any photographs."""
-    pictures = folder / "pictures"
-    pictures.mkdir(parents=True)
-    lines = []
-    for i, direction in enumerate(lamps):
-        write_exr(pictures / f"p{i:03}.exr", render(shape, half_width, lamp_light(direction), samples, seed=i))
-        lines.append(f"p{i:03}.exr {direction[0]:.9f} {direction[1]:.9f} {direction[2]:.9f}")
-    (folder / "lights.lp").write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
-    run("stagectl", "ingest", pictures, "--lights", folder / "lights.lp", "-o", folder / "take.rfa")
-    return folder / "take.rfa"
+    pictures = [render(shape, half_width, lamp_light(lamp), samples, seed) for seed, lamp in enumerate(lamps)]
+    return ingested(folder, lamps, pictures)
 
 
 def relit(archive, rgb, folder, *options):
     write_exr(folder / "map.exr", rgb)
     run("rf", "relight", archive, "--env", folder / "map.exr", "--float", "-o", folder / "relit.exr", *options)
-    return read_rgb(folder / "relit.exr")
+    return read_exr(folder / "relit.exr", "RGB")
 
 
 def cell_means(rgb, lamps):
@@ -179,7 +155,7 @@ def test_the_head_under_a_real_map_is_mitsubas_head(lamps, tmp_path):
     take = archive_of(shape, 0.16, lamps, tmp_path / "head", samples=16)
     for name in ("courtyard", "sunset"):
         path = next(ASSETS.rglob(f"{name}.exr"))
-        rgb = np.clip(read_rgb(path), 0, None)
+        rgb = np.clip(read_exr(path, "RGB"), 0, None)
         rgb = rgb.reshape(MAP_HEIGHT, rgb.shape[0] // MAP_HEIGHT, 2 * MAP_HEIGHT, -1, 3).mean(axis=(1, 3))
         got, full, at_lamps = relit(take, rgb, tmp_path), Truth(shape, 0.16, rgb), Truth(shape, 0.16, cell_means(rgb, lamps))
         inside = render(shape, 0.16, {"type": "constant"}, samples=16)[..., 0] > 0.05

@@ -2,30 +2,10 @@
 """Lamp weights and relit pictures against numpy that shares no code with them: a map is sampled densely and every sample goes to
 the lamp with the largest cosine."""
 import json
-import subprocess
-from pathlib import Path
 
 import numpy as np
-import OpenEXR
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-BIN = ROOT / "build/host/bin"
-
-
-def run(program, *arguments):
-    return subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
-
-
-def write_exr(path, rgb):
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    channels = {name: np.ascontiguousarray(rgb[..., c], dtype=np.float32) for c, name in enumerate("RGB")}
-    OpenEXR.File(header, channels).write(str(path))
-
-
-def read_exr(path):
-    channels = OpenEXR.File(str(path), separate_channels=True).channels()
-    return np.stack([channels[name].pixels for name in "RGBA"], axis=-1).astype(np.float64)
+from pictures import ingested, read_exr, refusal, run, write_exr, write_lp
 
 
 def dome(count, seed):
@@ -34,11 +14,6 @@ def dome(count, seed):
     directions = generator.normal(size=(count * 3, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return directions[directions[:, 1] > -0.34][:count]
-
-
-def write_lp(path, names, directions):
-    lines = [f"{name} {x:.9f} {y:.9f} {z:.9f}" for name, (x, y, z) in zip(names, directions)]
-    path.write_text(f"{len(lines)}\n" + "\n".join(lines) + "\n")
 
 
 def sunny_map(width, height, seed):
@@ -90,18 +65,15 @@ def test_weights_are_those_of_dense_sampling(tmp_path, rotate_deg):
     np.testing.assert_allclose(got.sum(axis=0), expected.sum(axis=0), rtol=1e-6)
 
 
+def random_images(count, height, width, seed):
+    return np.random.default_rng(seed).integers(0, 1024, (count, height, width, 3)) / 1024  # exact in half precision
+
+
 def test_a_relit_picture_is_the_weighted_sum(tmp_path):
     lamps, rgb = dome(25, seed=3), sunny_map(48, 24, seed=4)
-    images = np.random.default_rng(5).integers(0, 1024, (len(lamps), 18, 30, 3)) / 1024  # exact in half precision
-    folder = tmp_path / "photographs"
-    folder.mkdir()
-    names = [f"photograph_{i:02}.exr" for i in range(len(lamps))]
-    for name, image in zip(names, images):
-        write_exr(folder / name, image)
-    write_lp(tmp_path / "lights.lp", names, lamps)
+    images = random_images(25, 18, 30, seed=5)
     write_exr(tmp_path / "map.exr", rgb)
-    run("stagectl", "ingest", folder, "--lights", tmp_path / "lights.lp", "-o", tmp_path / "take.rfa")
-    run("rf", "relight", tmp_path / "take.rfa", "--env", tmp_path / "map.exr", "--rotate", 30, "--exposure", -3, "--float", "-o",
+    run("rf", "relight", ingested(tmp_path, lamps, images), "--env", tmp_path / "map.exr", "--rotate", 30, "--exposure", -3, "--float", "-o",
         tmp_path / "relit.exr")
     got = read_exr(tmp_path / "relit.exr")
     weights = weights_by_sampling(rgb, lamps, 30) / 8
@@ -110,23 +82,77 @@ def test_a_relit_picture_is_the_weighted_sum(tmp_path):
     assert (got[..., 3] == 1).all()
 
 
-def test_a_point_light_gives_back_the_photograph_of_its_lamp(tmp_path):
-    lamps = dome(12, seed=6)
-    images = np.random.default_rng(7).integers(0, 1024, (len(lamps), 8, 9, 3)) / 1024
-    folder = tmp_path / "photographs"
-    folder.mkdir()
-    names = [f"photograph_{i:02}.exr" for i in range(len(lamps))]
-    for name, image in zip(names, images):
-        write_exr(folder / name, image)
-    write_lp(tmp_path / "lights.lp", names, lamps)
-    run("stagectl", "ingest", folder, "--lights", tmp_path / "lights.lp", "-o", tmp_path / "take.rfa")
+def test_a_point_light_gives_back_the_picture_of_its_lamp(tmp_path):
+    lamps, images = dome(12, seed=6), random_images(12, 8, 9, seed=7)
     light = " ".join(f"{v:.6f}" for v in lamps[7] * 3) + " 1 0.5 0"
-    run("rf", "relight", tmp_path / "take.rfa", "--light", light, "--float", "-o", tmp_path / "relit.exr")
+    run("rf", "relight", ingested(tmp_path, lamps, images), "--light", light, "--float", "-o", tmp_path / "relit.exr")
     np.testing.assert_allclose(read_exr(tmp_path / "relit.exr")[..., :3], images[7] * (1, 0.5, 0), atol=1e-6)
 
 
-def test_the_white_furnace_is_white(tmp_path):
+def test_outside_the_mask_the_picture_is_transparent(tmp_path):
+    lamps, images = dome(5, seed=8), random_images(5, 6, 8, seed=9)
+    mask = np.zeros((6, 8, 3))
+    mask[:, 3:] = 1
+    write_exr(tmp_path / "mask.exr", mask)
+    take = ingested(tmp_path, lamps, images, "--mask", tmp_path / "mask.exr")
+    report = json.loads(run("rf", "relight", take, "--light", "0 1 0 1 1 1", "-o", tmp_path / "relit.exr", "--json"))
+    relit = read_exr(tmp_path / "relit.exr")
+    assert report["targets"][0]["masked_pixels"]["outside"] == 18
+    assert (relit[:, :3] == 0).all() and (relit[:, 3:, 3] == 1).all() and relit[:, 3:, :3].sum() > 0
+
+
+def test_the_number_of_threads_changes_no_byte(tmp_path):
+    take = ingested(tmp_path, dome(9, seed=1), random_images(9, 70, 50, seed=2))
+    write_exr(tmp_path / "map.exr", sunny_map(48, 24, seed=3))
+    for threads in (1, 3):
+        run("rf", "relight", take, "--env", tmp_path / "map.exr", "--threads", threads, "-o", tmp_path / f"{threads}.exr")
+    assert (tmp_path / "1.exr").read_bytes() == (tmp_path / "3.exr").read_bytes()
+
+
+def test_bad_input_is_named_and_nothing_is_written(tmp_path):
+    take = ingested(tmp_path, dome(5, seed=1), random_images(5, 6, 8, seed=2))
+    (tmp_path / "text.exr").write_text("no picture")
+    write_exr(tmp_path / "map.exr", np.ones((8, 16, 3)))
+    output = tmp_path / "relit.exr"
+
+    def refused(*options, archive=take, to=output):
+        return refusal("rf", "relight", archive, *options, "-o", to)
+
+    assert "no light is given" in refused()
+    assert "text.exr" in refused("--env", tmp_path / "text.exr")
+    assert "nothing.exr" in refused("--env", tmp_path / "nothing.exr")
+    assert "six numbers" in refused("--light", "0 1 0 1 1")
+    assert "no direction" in refused("--light", "0 0 0 1 1 1")
+    assert "not square" in refused("--env", tmp_path / "map.exr", "--env-convention", "angular")
+    assert "use openexr, mirrored or angular" in refused("--env", tmp_path / "map.exr", "--env-convention", "cube")
+    assert "no finished target 3" in refused("--light", "0 1 0 1 1 1", "--target", 3)
+    assert "nowhere.rfa" in refused("--light", "0 1 0 1 1 1", archive=tmp_path / "nowhere.rfa")
+    assert "brighter than single precision" in refused("--light", "0 1 0 1e39 1 1")
+    assert "nowhere/relit.exr" in refused("--light", "0 1 0 1 1 1", to=tmp_path / "nowhere/relit.exr")
+    assert not output.exists() and not list(tmp_path.glob("*.part*"))
+
+
+def test_values_beyond_half_precision_are_reported(tmp_path):
+    take = ingested(tmp_path, dome(5, seed=1), np.ones((5, 6, 8, 3)))
+    report = json.loads(run("rf", "relight", take, "--light", "0 1 0 1e6 1 1", "-o", tmp_path / "relit.exr", "--json"))
+    assert report["targets"][0]["clamped_values"] == 48
+    assert read_exr(tmp_path / "relit.exr")[..., 0].max() == 65504
+
+
+def test_the_white_furnace_is_white():
     report = json.loads(run("rf", "furnace"))
     assert report["white_furnace_error"] < 0.002
     assert report["worst_normal_deviation"] < 0.001
     assert abs(report["solid_angle_sr"] - 4 * np.pi) < 1e-9
+
+
+def test_compare_agrees_with_numpy(tmp_path):
+    a, b = (np.random.default_rng(seed).uniform(0, 2, (5, 7, 3)).astype(np.float32) for seed in (1, 2))
+    write_exr(tmp_path / "a.exr", a)
+    write_exr(tmp_path / "b.exr", b)
+    report = json.loads(run("rf", "compare", tmp_path / "a.exr", tmp_path / "b.exr", "--json"))
+    error = a.astype(np.float64) - b
+    assert report["psnr_db"] == pytest.approx(10 * np.log10(b.max() ** 2 / (error**2).mean()), rel=1e-6)
+    assert report["mean_relative"] == pytest.approx(np.abs(error).sum() / b.sum(), rel=1e-6)
+    write_exr(tmp_path / "c.exr", a[:4])
+    assert "c.exr" in refusal("rf", "compare", tmp_path / "c.exr", tmp_path / "b.exr")

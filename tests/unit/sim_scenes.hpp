@@ -53,7 +53,7 @@ inline StageConfig small_stage(const std::vector<Vec3>& lamps, int width = 64, i
 inline Vec3 default_camera_ray(const CameraConfig& camera, int x, int y) {
     const double half = std::tan(camera.vertical_fov_deg / 2 * 3.14159265358979323846 / 180);
     return normalized(Vec3{((x + 0.5) / camera.width * 2 - 1) * half * camera.width / camera.height,
-                       (1 - (y + 0.5) / camera.height * 2) * half, -1});
+                           (1 - (y + 0.5) / camera.height * 2) * half, -1});
 }
 
 inline std::vector<Float3> one_lamp(size_t lamps, size_t lit, float weight = 1) {

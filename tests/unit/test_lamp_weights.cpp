@@ -232,6 +232,13 @@ TEST(LampWeights, a_point_light_of_colour_one_gives_back_its_lamp) {
     EXPECT_EQ(lit_lamps(weights), std::set<int>{37});
 }
 
+TEST(LampWeights, the_share_of_some_lamps_is_theirs_over_all) {
+    const LampWeights weights{{{1, 2, 3}, {0, 0, 6}, {4, 4, 4}}};
+    EXPECT_DOUBLE_EQ(share_of_light(weights, {0, 2}), 18.0 / 24);
+    EXPECT_EQ(share_of_light(weights, {}), 0);
+    EXPECT_EQ(share_of_light({{Rgb{}, Rgb{}}}, {1}), 0);
+}
+
 TEST(LampWeights, a_white_furnace_is_white_on_average_over_all_normals) {
     const auto cells = stage_cells();
     const auto weights =

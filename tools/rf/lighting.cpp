@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <sstream>
@@ -62,8 +63,9 @@ void LightingOptions::add_to(CLI::App& verb) {
                     "angular: angular probe, -Z in the middle")
         ->type_name("NAME");
     verb.add_option("--rotate", rotate_deg, "turn the map about +Y; 90 moves light from the camera (+Z) to +X")
-        ->type_name("DEG");
-    verb.add_option("--exposure", exposure_ev, "all light times 2^EV")->type_name("EV");
+        ->type_name("DEG")
+        ->check(CLI::Range(-3600.0, 3600.0));
+    verb.add_option("--exposure", exposure_ev, "all light times 2^EV")->type_name("EV")->check(CLI::Range(-64.0, 64.0));
     verb.add_option("--light", lights,
                     "a point light from direction x y z, given to the lamp nearest to it; r g b is its irradiance over "
                     "pi: colour 1 1 1 shows that lamp's image as it is; repeatable")
@@ -90,11 +92,16 @@ Result<Lighting> make_lighting(const LightingOptions& options, const SphereCells
         lighting.report["point_lights"].push_back(
             {{"light", text}, {"lamp", lamp}, {"angle_to_lamp_deg", std::acos(std::min(cosine, 1.0)) / degree}});
     }
+    for (const Rgb& w : lighting.weights.irradiance)
+        for (double v : w)
+            if (!(std::abs(v) < std::numeric_limits<float>::max()))
+                return fail("the light is brighter than single precision holds: lower --exposure or the map's values");
     return lighting;
 }
 
 Result<SphereCells> cells_of_lights(const std::vector<LightPosition>& lights) {
     std::vector<Vec3> directions;
+    directions.reserve(lights.size());
     for (const auto& light : lights) directions.push_back(light.direction);
     return SphereCells::make(directions);
 }

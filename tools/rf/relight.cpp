@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -90,13 +91,11 @@ Result<RelitTarget> relight_target(const ArchiveReader& archive, const TargetEnt
     return relit;
 }
 
-// The light of the missing lamps over all light, which the picture lacks.
-double missing_light(const std::vector<int>& lamps, const LampWeights& weights) {
-    double missing = 0, all = 0;
-    for (const Rgb& w : weights.irradiance) all += w[0] + w[1] + w[2];
-    for (int lamp : lamps)
-        for (double w : weights.irradiance[lamp]) missing += w;
-    return all > 0 ? missing / all : 0;
+// Half floats end at 65504; what is brighter is written as that.
+size_t values_beyond_half(const Image& image) {
+    constexpr float largest_half = 65504;
+    return size_t(
+        std::count_if(image.data.begin(), image.data.end(), [](float v) { return std::abs(v) > largest_half; }));
 }
 
 Result<std::vector<TargetEntry>> chosen_targets(const ArchiveReader& archive, const Options& options) {
@@ -133,21 +132,26 @@ std::map<std::string, std::string> header_attributes(const TakeInfo& info, const
             {"relit.exposureEV", fmt::format("{}", options.lighting.exposure_ev)}};
 }
 
-void warn(const RelitTarget& relit, const std::string& file, double light_missing) {
+void warn(const RelitTarget& relit, const std::string& file, double light_missing, size_t clamped_values) {
     if (!relit.missing_lamps.empty())
         fmt::print(stderr, "rf relight: {}: {} lamps are missing, and with them {:.2f} % of the light\n", file,
                    relit.missing_lamps.size(), 100 * light_missing);
     if (relit.left_out_samples > 0)
         fmt::print(stderr, "rf relight: {}: {} samples are NaN or Inf and were left out\n", file,
                    relit.left_out_samples);
+    if (clamped_values > 0)
+        fmt::print(stderr,
+                   "rf relight: {}: {} values are beyond 65504, the largest half: lower --exposure or add --float\n",
+                   file, clamped_values);
 }
 
 Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const TargetEntry& entry,
                                          const Lighting& lighting, const Options& options, bool several) {
     auto relit = relight_target(archive, entry, lighting.weights, options.threads);
     if (!relit) return relit.error();
-    const double light_missing = missing_light(relit->missing_lamps, lighting.weights);
-    warn(*relit, entry.file, light_missing);
+    const double light_missing = share_of_light(lighting.weights, relit->missing_lamps);
+    const size_t clamped_values = options.single_float ? 0 : values_beyond_half(relit->image);
+    warn(*relit, entry.file, light_missing, clamped_values);
     const auto output = output_name(options.output, entry, several), png = output_name(options.png, entry, several);
     const auto written =
         write_exr(output, relit->image, options.single_float ? ExrType::single_float : ExrType::half_float,
@@ -164,6 +168,7 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
                           {"missing_lamps", relit->missing_lamps},
                           {"missing_light", light_missing},
                           {"left_out_samples", relit->left_out_samples},
+                          {"clamped_values", clamped_values},
                           {"masked_pixels",
                            {{"saturated", relit->saturated},
                             {"missing", relit->missing},

@@ -18,8 +18,8 @@ float smoothstep(float low, float high, float value) {
 
 // Fine relief in metres: creases of some 3 mm and pores of 1 mm, shallower where there is hair.
 float relief(Float3 p) {
-    return 1.2e-4f * fractal_noise3(p * 330, 3, 0.6f, 11) -
-           0.6e-4f * smoothstep(0.45f, 0.0f, speckle3(p * 850, 12).distance);
+    return 0.8e-4f * fractal_noise3(p * 330, 3, 0.6f, 11) -
+           0.45e-4f * smoothstep(0.45f, 0.0f, speckle3(p * 850, 12).distance);
 }
 
 Float3 with_relief(Float3 normal, Float3 p, float strength) {
@@ -38,14 +38,16 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     Float3 albedo = material.albedo * (1 + 0.20f * tone);
     albedo = albedo * mix({1, 1, 1}, {1.02f, 0.72f, 0.66f}, blood);
 
-    const Speckle freckle = speckle3(p * 210, 3);
-    const float freckled = freckle.random > 0.72f ? smoothstep(0.34f, 0.10f, freckle.distance) * freckle.random : 0;
-    albedo = albedo * mix({1, 1, 1}, {0.74f, 0.60f, 0.50f}, 0.75f * freckled * (1 - lips));
+    // Freckles gather where the sun reaches: nose and cheeks, as the flush does.
+    const Speckle freckle = speckle3(p * 300, 3);
+    const float sunned = freckle.random > 0.93f - 0.45f * flush ? 0.3f + 0.6f * flush : 0;
+    const float freckled = sunned * smoothstep(0.32f, 0.08f, freckle.distance) * (1 - lips);
+    albedo = albedo * mix({1, 1, 1}, {0.74f, 0.60f, 0.50f}, freckled);
     albedo = albedo * (1 - 0.10f * smoothstep(0.4f, 0.0f, speckle3(p * 850, 12).distance));
 
     // Lips: darker and redder with fine vertical creases.
     const float crease = noise3({p.x * 900, p.y * 160, p.z * 300}, 5);
-    albedo = mix(albedo, material.albedo * Float3{0.80f, 0.44f, 0.46f} * (1 + 0.12f * crease), 0.85f * lips);
+    albedo = mix(albedo, material.albedo * Float3{0.78f, 0.40f, 0.42f} * (1 + 0.12f * crease), 0.85f * lips);
 
     // Short hair: strands of about half a millimetre that let some skin through.
     const float strand = 0.5f + 0.5f * noise3({p.x * 1500, p.y * 700, p.z * 1000}, 6);

@@ -98,7 +98,7 @@ def _brow_distance(x, y, eye):
     side = abs(x) - abs(eye[0])
     t = min(1.0, max(0.0, (side + 0.19) / 0.44))
     along_x = -0.19 + 0.44 * t
-    line_y = eye[1] + 0.185 + 0.095 * math.sin(math.pi * (0.12 + 0.62 * t)) - 0.03 * t
+    line_y = eye[1] + 0.150 + 0.080 * math.sin(math.pi * (0.12 + 0.66 * t)) - 0.015 * t
     return math.hypot((side - along_x), (y - line_y)), t
 
 
@@ -112,13 +112,14 @@ def _masks(vertex, eyes, mouth):
     hair = 0.0
     if z > 0.9:
         distance, along = _brow_distance(x, y, eye)
-        width = 0.062 * (1 - 0.62 * along ** 1.5) + 0.004
-        hair = 0.9 * (1 - _smoothstep(0.45 * width, 1.35 * width, distance))
+        width = 0.042 * (1 - 0.60 * along ** 1.5) + 0.004
+        hair = 0.72 * (1 - _smoothstep(0.35 * width, 1.6 * width, distance)) * _smoothstep(-0.05, 0.15, along + 0.05)
     # The scalp: above a line that runs from the forehead over the temple to behind the ear and the nape.
     front = min(1.0, max(0.0, (z + 0.55) / 1.75))
     hairline = eye[1] - 0.75 + 1.42 * front ** 0.85 - 0.10 * (abs(x) / 0.75) ** 4 * front
     ear = min(_ellipse(u, v, e) for e in _EARS_UV)
-    hair = max(hair, 0.80 * _smoothstep(-0.05, 0.20, y - hairline) * _smoothstep(1.0, 1.35, ear))
+    scalp = _smoothstep(-0.05, 0.20, y - hairline) * _smoothstep(1.0, 1.35, ear) * _smoothstep(-1.2, -0.9, y - eye[1])
+    hair = max(hair, 0.80 * scalp)
     # Lashes: the rim of the lids, the only skin that nearly touches the eyeball's front.
     gap = math.dist((x, y, z), eye) - eye_radius
     if z > eye[2]:

@@ -42,8 +42,12 @@ async function main() {
   });
   const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage,
                                    openSince: () => recorder?.openSince ?? Infinity });
-  const usb = options.usb ? new UsbSocket(options.usb, () => board.usbHost, () => pacer.wake(), log,
-    (connected) => stage?.send({ type: 'usb', connected })) : null;
+  const usb = options.usb ? new UsbSocket(options.usb, {
+    host: () => board.usbHost,
+    onActivity: () => pacer.wake(),
+    onClient: (connected) => stage?.send({ type: 'usb', connected }),
+    log,
+  }) : null;
   await usb?.listen();
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });

@@ -20,19 +20,22 @@ export class UsbSocket {
   #inFlight = new Map(); // tag -> handle of the host
   #host;
   #log;
+  #onActivity;
   #onClient;
 
   /**
-   * @param {() => import('./usb_host.mjs').UsbHost} host the chip's at this moment
-   * @param {() => void} onActivity called when something has come in
-   * @param {(connected: boolean) => void} onClient called when a client has come or gone
+   * @param {object} options
+   * @param {() => import('./usb_host.mjs').UsbHost} options.host the chip's at this moment
+   * @param {() => void} options.onActivity called when something has come in
+   * @param {(connected: boolean) => void} options.onClient called when a client has come or gone
+   * @param {(text: string) => void} options.log
    */
-  constructor(path, host, onActivity, log, onClient = () => {}) {
+  constructor(path, { host, onActivity, onClient, log }) {
     this.#path = path;
     this.#host = host;
-    this.#log = log;
-    this.onActivity = onActivity;
+    this.#onActivity = onActivity;
     this.#onClient = onClient;
+    this.#log = log;
     this.#server = createServer((socket) => this.#accept(socket));
   }
 
@@ -48,10 +51,6 @@ export class UsbSocket {
       this.#server.once('error', (error) => reject(new Error(`${this.#path}: cannot listen (${error.code})`)));
       this.#server.listen(this.#path, resolve);
     });
-  }
-
-  get connected() {
-    return this.#client !== null;
   }
 
   /** The device has gone: pending transfers have been answered, the client must connect anew. */
@@ -89,10 +88,10 @@ export class UsbSocket {
       if (socket !== this.#client) return;
       this.#forget();
       this.#host().unplug();
-      this.onActivity();
+      this.#onActivity();
     });
     this.#host().plug();
-    this.onActivity();
+    this.#onActivity();
   }
 
   #forget() {
@@ -116,7 +115,7 @@ export class UsbSocket {
       this.#input = this.#input.subarray(total);
       this.#start(request);
     }
-    this.onActivity();
+    this.#onActivity();
   }
 
   /** @returns the request's header, or undefined if this is none: then there is no telling where the next begins */
