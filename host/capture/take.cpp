@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <numeric>
 #include <thread>
@@ -112,6 +113,11 @@ class TakeWriter {
             if (target.ok()) {
                 outcome.target = std::make_unique<Target>(std::move(*target));
                 outcome.target->index = frames->cycle;
+                const auto& mask = outcome.target->mask;
+                const auto saturated =
+                    std::count_if(mask.begin(), mask.end(), [](uint32_t m) { return (m & mask_saturated) != 0; });
+                outcome.detail["saturated_pixels"] = saturated;
+                report_.saturated_share = std::max(report_.saturated_share, double(saturated) / double(mask.size()));
                 outcome.target->provenance = outcome.detail;
             } else {
                 outcome.why = target.error().message;

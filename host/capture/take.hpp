@@ -15,6 +15,7 @@ namespace ols {
 struct TakeReport {
     RecordReport record;
     int targets_written = 0, targets_missing = 0;
+    double saturated_share = 0;  // of a target's pixels that rest on a saturated sample, in the worst target
     // Where the time went: of the whole take, and busy in each thread.
     double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
     std::string write_error;  // the first target that could not be written, and why; empty when all were

@@ -55,6 +55,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"targets_written", report.targets_written},
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
+            {"saturated_share", report.saturated_share},
             {"seconds",
              {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
 }
@@ -69,6 +70,10 @@ void print_report(const TakeReport& report, const Options& options) {
     if (!record.unfit_frame.empty())
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);
+    if (report.saturated_share > 0)
+        fmt::print(stderr,
+                   "stagectl: {:.2g} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
+                   report.saturated_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (record.slots_missing > 0)
         fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",

@@ -393,3 +393,21 @@ TEST(Identify, an_unsteady_subject_keeps_its_lock) {
     EXPECT_EQ(outcome.mislabelled, 0);
     EXPECT_TRUE(outcome.missing.empty());
 }
+
+TEST(TriggerGrid, drift_is_measured_and_times_between_triggers_are_refused) {
+    const double period_ns = 462'960, drift = 40e-6;
+    const auto time = [&](uint64_t n) { return uint64_t(5e9 + double(n) * period_ns * (1 + drift)); };
+    TriggerGrid grid(period_ns, time(0), 180);
+    for (uint64_t n = 1; n <= 400; ++n) {
+        ASSERT_EQ(grid.steps_to(time(n)), 1u);
+        grid.advance(1, time(n));
+    }
+    EXPECT_NEAR(grid.drift_ppm(), 40, 0.1);
+    // A pause of ten seconds: 400 us of drift would be a trigger's width if it were not known.
+    EXPECT_EQ(grid.steps_to(time(22000)), 21600u);
+    EXPECT_EQ(TriggerGrid(period_ns, time(400), 180).steps_to(time(22000)), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(401) + 30'000), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(400)), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(399)), std::nullopt);
+    EXPECT_NEAR(double(grid.time_after_ns(-3)), double(time(397)), 2);
+}
