@@ -23,9 +23,9 @@ host: setup ## build/host/bin/{stagectl,rf,stagesim}
 	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
 	@ninja -C $(HOST) --quiet
 
-checked: setup ## the same code and its unit tests with ASan and UBSan, in build/checked
+checked: setup ## the unit tests and what they test, with ASan and UBSan, in build/checked
 	@test -e $(CHECKED)/build.ninja || cmake -S . -B $(CHECKED) -G Ninja -DOLS_SANITIZE=ON >/dev/null
-	@ninja -C $(CHECKED) --quiet
+	@ninja -C $(CHECKED) --quiet unit_tests
 
 assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 	@python3 tools/stagesim/assets/fetch.py
