@@ -180,10 +180,14 @@ std::optional<double> measured_black(const Calibration& calibration) {
 
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
                             const Calibration& calibration, ArchiveWriter& archive, const std::atomic<bool>& stop,
+                            const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress) {
     const auto start = Clock::now();
     TakeWriter writer(sequence, stage, calibration, archive);
-    const RecordSink sink{[&](std::shared_ptr<const Frame> frame) { writer.add_frame(std::move(frame)); },
+    const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
+                              identified(*frame);
+                              writer.add_frame(std::move(frame));
+                          },
                           [&](const MissingSlot& slot) { writer.add_missing(slot); },
                           [&](uint64_t decided, uint64_t total) {
                               writer.hand_on(decided);

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: MIT
 """Checks a trace of the board against the program it played, twice: by our own reading of the VCD and by sigrok-cli.
 
-usage: check_trace.py TRACE.vcd PROGRAM.json
+usage: check_trace.py TRACE.vcd PROGRAM.json [PROGRAM.json ...]
 
-PROGRAM.json holds {"cycles": n, "slots": [{"kind", "trigger_mask", "exposure_ticks", "period_ticks", "bits"}, ...]}:
+The programs were played one after the other. PROGRAM.json holds {"cycles": n, "slots": [{"kind", "trigger_mask", "exposure_ticks", "period_ticks", "bits"}, ...]}:
 kind 3 is dark, bits are a list of 0 and 1 in chain order. Prints JSON, errors in ticks of 8 ns. Exits with 1 if
 anything is wrong, or if sigrok-cli is not there to check.
 """
@@ -13,6 +13,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import deque
 
 TICK_NS = 8
 DARK = 3
@@ -44,33 +45,39 @@ def pulses(changes, name):
     return list(zip(edges[0::2], edges[1::2]))
 
 
-def latched_words(changes):
-    """(tick, bits shifted in since the last LATCH) for each rise of LATCH."""
-    level, shifted, words = {}, [], []
+def latched_words(changes, chain_bits):
+    """(tick, the chain's bits, which are the last that were shifted in) for each rise of LATCH."""
+    level, shifted, words = {}, deque(maxlen=chain_bits), []
     for tick, name, value in changes:
         rises = value > level.get(name, 0)
         if name == "CLK" and rises:
             shifted.append(level["DATA"])
         if name == "LATCH" and rises:
-            words.append((tick, shifted))
-            shifted = []
+            words.append((tick, list(shifted)))
         level[name] = value
     return words
 
 
-def expected_slots(program):
-    """Every slot that is played, in order, each with its start in ticks after the first."""
-    start, slots = 0, []
-    for _ in range(program["cycles"]):
-        for slot in program["slots"]:
-            slots.append({**slot, "start": start})
-            start += slot["period_ticks"]
+def expected_slots(programs):
+    """Every slot that is played, in order, each with its program's number and its start in ticks after the first."""
+    slots = []
+    for play, program in enumerate(programs):
+        start = 0
+        for _ in range(program["cycles"]):
+            for slot in program["slots"]:
+                slots.append({**slot, "play": play, "start": start})
+                start += slot["period_ticks"]
     return slots
+
+
+def expected_periods(slots):
+    """Ticks from each slot to the next, None where the next begins another program."""
+    return [b["start"] - a["start"] if a["play"] == b["play"] else None for a, b in zip(slots, slots[1:])]
 
 
 def own_check(changes, slots):
     """Triggers, light and shift words as the edges have them, against the slots."""
-    words = latched_words(changes)
+    words = latched_words(changes, len(slots[0]["bits"]))
     light = pulses(changes, "LIGHT_EN")
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong([w for _, w in words], slots)}
     report["triggers"] = report["triggers_expected"] = 0
@@ -80,8 +87,8 @@ def own_check(changes, slots):
         wanted = [slot for slot in slots if slot["trigger_mask"] >> n & 1]
         report["triggers"] += len(found)
         report["triggers_expected"] += len(wanted)
-        starts = [slot["start"] for slot in wanted]
-        errors += [(b[0] - a[0]) - (t - s) for a, b, s, t in zip(found, found[1:], starts, starts[1:])]
+        steps = zip(found, found[1:], expected_periods(wanted))
+        errors += [(b[0] - a[0]) - period for a, b, period in steps if period is not None]
         exposure_errors += [fall - rise - slot["exposure_ticks"] for (rise, fall), slot in zip(found, wanted)]
         if n == 0:
             lit = [pulse for pulse, slot in zip(found, wanted) if slot["kind"] != DARK]
@@ -105,13 +112,14 @@ def sigrok_check(path, slots):
         return {"error": "sigrok-cli is not installed"}
     spi = "spi:clk=CLK:mosi=DATA:cs=LATCH:cs_polarity=active-low:wordsize=8"
     transfers = [line.split(":")[1].split() for line in decode(path, spi, "spi=mosi-transfer")]
-    words = [[int(bit) for byte in line for bit in f"{int(byte, 16):08b}"] for line in transfers]
+    chain_bits = len(slots[0]["bits"])
+    words = [[int(bit) for byte in line for bit in f"{int(byte, 16):08b}"][-chain_bits:] for line in transfers]
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong(words, slots)}
-    wanted = [slot["start"] for slot in slots if slot["trigger_mask"] & 1]
-    periods = [b - a for a, b in zip(wanted, wanted[1:])]
+    periods = expected_periods([slot for slot in slots if slot["trigger_mask"] & 1])
     found = [ticks_of(line) for line in decode(path, "timing:data=TRIG0:edge=rising", "timing=time")]
     report["triggers"] = len(found) + 1
-    off = [abs(ticks - period) if abs(ticks - period) > unit / 2 else 0 for (ticks, unit), period in zip(found, periods)]
+    off = [abs(ticks - period) if abs(ticks - period) > unit / 2 else 0
+           for (ticks, unit), period in zip(found, periods) if period is not None]
     report["trigger_period_error_ticks"] = round(max(off, default=0), 3)
     return report
 
@@ -129,8 +137,8 @@ def ticks_of(line):
     return float(number) * scale_ns / TICK_NS, scale_ns / TICK_NS / 10**digits
 
 
-def check(trace, program):
-    slots = expected_slots(program)
+def check(trace, *programs):
+    slots = expected_slots(programs)
     changes = read_vcd(trace)
     report = {"own": own_check(changes, slots), "sigrok": sigrok_check(trace, slots)}
     own, sigrok = report["own"], report["sigrok"]
@@ -145,10 +153,13 @@ def check(trace, program):
 
 
 def main():
-    if len(sys.argv) != 3:
+    if len(sys.argv) < 3:
         raise SystemExit(__doc__)
-    with open(sys.argv[2]) as file:
-        report = check(sys.argv[1], json.load(file))
+    programs = []
+    for path in sys.argv[2:]:
+        with open(path) as file:
+            programs.append(json.load(file))
+    report = check(sys.argv[1], *programs)
     print(json.dumps(report, indent=2))
     sys.exit(0 if report["right"] else 1)
 
