@@ -140,12 +140,12 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
     const fs::path final_name = state.root / relative, temporary = final_name.string() + unfinished_suffix;
     std::error_code error;
     if (fs::create_directory(final_name.parent_path(), error))
-        if (const auto synced = sync_directory(state.root.string()); !synced) return synced;
+        if (auto s = sync_directory(state.root.string()); !s) return s;
     if (error) return fail("cannot make '" + final_name.parent_path().string() + "': " + error.message());
 
     if (auto s = write_target_file(temporary.string(), state.info, head, source); !s) return s;
     const auto sum = checksum_file(temporary.string());
-    const Status renamed = sum.ok() ? rename_durably(temporary.string(), final_name.string()) : sum.error();
+    Status renamed = sum.ok() ? rename_durably(temporary.string(), final_name.string()) : sum.error();
     if (!renamed) {
         fs::remove(temporary, error);
         return renamed;

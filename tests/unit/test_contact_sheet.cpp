@@ -77,6 +77,27 @@ TEST(ContactSheet, exposure_follows_the_brightest_lamp_and_not_the_dark_ones) {
     }
 }
 
+TEST(ContactSheet, pictures_are_cut_to_what_any_lamp_shows) {
+    const auto size_with = [](std::initializer_list<std::pair<int, int>> corners) {
+        ContactSheet sheet({{"", {0, 1, 0}}, {"", {0, 0, 1}}}, 400, 300);
+        int lamp = 0;
+        for (const auto& [left, top] : corners) {
+            Image image(400, 300, 3);
+            for (int y = top; y < top + 60; ++y)
+                for (int x = left; x < left + 40; ++x) image.at(x, y, 1) = 2;
+            image.at(3, 5, 0) = 2;  // a hot pixel is no subject
+            sheet.add(lamp++, image);
+        }
+        const auto picture = sheet.picture("", 0);
+        return std::pair(picture.width, picture.height);
+    };
+    const auto [narrow_width, narrow_height] = size_with({{100, 100}, {100, 100}});
+    const auto [wide_width, wide_height] = size_with({{100, 100}, {260, 200}});
+    // The box of both grows by 160 x 100 pixels; there is one column of two rows.
+    EXPECT_EQ(wide_width - narrow_width, 160);
+    EXPECT_EQ(wide_height - narrow_height, 2 * 100);
+}
+
 TEST(ContactSheet, a_take_of_black_or_of_nan_is_drawn_black) {
     ContactSheet sheet({{"", {0, 1, 0}}}, 40, 30);
     Image image(40, 30, 3);
