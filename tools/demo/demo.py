@@ -21,7 +21,8 @@ STAGES = {"noisy": "tools/demo/stage.toml", "clean": "tools/demo/stage_clean.tom
 HEAD = "tools/stagesim/scenes/head.toml"
 CARD = "tools/stagesim/scenes/card.toml"
 CARD_REFLECTANCE = 0.985
-ENVIRONMENTS = {"courtyard": 0.5, "sunset": 1.0, "night": 3.0}  # of .cache/assets/env, with their exposure in stops
+# Of .cache/assets/env: exposure in stops, turn about the vertical in degrees.
+ENVIRONMENTS = {"courtyard": (0.2, 0), "city": (0.4, 0), "sunset": (1.3, 120)}
 TRUTH_ENVIRONMENT = "sunset"
 COMPARED = ["single", "hadamard156"]  # bases whose pictures are held against the truth
 SHOWN = "s159"  # the basis of the take that is shown
@@ -76,8 +77,8 @@ class Demo:
         with self.clock("contact sheet"):
             run(BIN / "rf", "export", take, "--contact-sheet", self.out / "contact-sheet.png")
         with self.clock("relight under three environments"):
-            for name, stops in ENVIRONMENTS.items():
-                run(BIN / "rf", "relight", take, "--env", environment(name), "--exposure", stops,
+            for name, (stops, degrees) in ENVIRONMENTS.items():
+                run(BIN / "rf", "relight", take, "--env", environment(name), "--exposure", stops, "--rotate", degrees,
                     "-o", self.out / f"relit_{name}.exr", "--png", self.out / f"relit_{name}.png")
 
     def compare(self):
