@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit hil stability fuzz-smoke fuzz lint lint-fast \
+.PHONY: all help setup firmware host checked assets demo test unit hil fuzz-smoke fuzz lint lint-fast \
         format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -33,16 +33,13 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@python3 tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability fuzz-smoke hil ## everything that needs no hardware
+test: all checked assets lint-fast unit fuzz-smoke hil ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@ctest --test-dir $(CHECKED) --output-on-failure -j2 --no-tests=error
 	@$(PYTHON) -m pytest -q tests/unit tests/oracle
 	@cd tools/stagesim/board && npm test --silent
-
-stability: all ## hard cases (docs/stability.md)
-	@$(PYTHON) -m pytest -q tests/stability
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board (BOARD=emulated)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
