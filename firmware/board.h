@@ -31,11 +31,12 @@ static const struct sequence_board board_sequence = {BOARD_CHAIN_BITS, BOARD_SHI
 // Clocks, pins (dark), wake-up interrupts, watchdog.
 void board_init(void);
 
-// Lamps off and triggers idle at once, whatever PIO does: the pins are taken from it. Safe in any state.
+// Lamps off and triggers idle at once, whatever PIO does: the pins are taken from it. Safe in any state. Triggers idle
+// at the level that board_connect_pins last chose, low after a reset.
 void board_dark(void);
 
-// Gives the pins to PIO.
-void board_connect_pins(void);
+// Gives the pins to PIO. Bit n of `inverted_triggers`: TRIGn is active low at the pad, for PIO it is high all the same.
+void board_connect_pins(uint8_t inverted_triggers);
 
 uint64_t board_time_us(void);
 

@@ -76,7 +76,8 @@ static void play(void) {
     while (board.playing && board.next_rise_ticks <= now_ticks()) {
         const struct sequence_slot* const slot = &sequence->slots[board.next_slot];
         if (slot->trigger_mask & 1) {
-            const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks;
+            const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks +
+                                  (uint64_t)(int64_t)slot->trigger_offset_ticks;
             board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
         }
         board.next_rise_ticks += slot->period_ticks;
@@ -147,7 +148,8 @@ void board_dark(void) {
     board.pins_connected = false;
 }
 
-void board_connect_pins(void) {
+void board_connect_pins(uint8_t inverted_triggers) {
+    (void)inverted_triggers;  // nobody looks at pins here
     board.pins_connected = true;
 }
 
@@ -184,7 +186,7 @@ uint32_t board_boot_nonce(void) {
 bool player_arm(const struct sequence* sequence) {
     board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
     board.events = 0;
-    board_connect_pins();
+    board_connect_pins(sequence->inverted_triggers);
     if (!board.shifter_starved) return true;
     player_stop();
     return false;
@@ -197,10 +199,8 @@ void player_start(void) {
     board.next_slot = board.cycle = 0;
 }
 
-uint32_t player_take_events(void) {
-    const uint32_t events = board.events;
-    board.events = 0;
-    return events;
+uint32_t player_events(void) {
+    return board.events;
 }
 
 void player_stop(void) {

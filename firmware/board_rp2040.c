@@ -56,10 +56,13 @@ static void init_clocks(void) {
     WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | 12;  // 12 MHz / 12: microseconds for timer and watchdog (4.7.2)
 }
 
+static uint32_t inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN;
+
 static void set_pins(uint32_t function) {
     for (uint32_t pin = BOARD_PIN_DATA; pin < BOARD_PINS_END; pin++) {
-        const bool inverted = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
-        GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | (inverted ? GPIO_OUTPUT_INVERTED : 0);
+        // Both ways, so that the witness sees a trigger as the timeline plays it.
+        const uint32_t inversion = inverted_pins >> pin & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
+        GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | inversion;
     }
 }
 
@@ -68,7 +71,8 @@ void board_dark(void) {
     set_pins(GPIO_FUNCTION_SIO);
 }
 
-void board_connect_pins(void) {
+void board_connect_pins(uint8_t inverted_triggers) {
+    inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN | (uint32_t)inverted_triggers << BOARD_PIN_TRIG0;
     set_pins(GPIO_FUNCTION_PIO0);
 }
 

@@ -39,6 +39,7 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
                                       .firmware_version = BOARD_FIRMWARE_VERSION,
                                       .boot_nonce = board_boot_nonce(),
                                       .tick_hz = BOARD_TICK_HZ,
+                                      .capabilities = OLS_CAN_OFFSET_TRIGGERS,
                                       .chain_bits = BOARD_CHAIN_BITS,
                                       .slots_max = OLS_SLOTS_MAX,
                                       .shift_ticks = sequence_shift_ticks(&board_sequence),

@@ -96,7 +96,7 @@ bool player_arm(const struct sequence* sequence) {
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
     start_feed(&timeline_feed, sequence->events, sequence->event_count, &table_addresses[0]);
     start_feed(&shifter_feed, sequence->patterns, sequence->slot_count * sequence->pattern_words, &table_addresses[1]);
-    board_connect_pins();
+    board_connect_pins(sequence->inverted_triggers);
     if (send_first_pattern()) return true;
     player_stop();
     return false;
@@ -106,10 +106,8 @@ void player_start(void) {
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(timeline.machine);
 }
 
-uint32_t player_take_events(void) {
-    const uint32_t events = PIO_IRQ(PIO0_BASE) & FLAGS_FOR_PROCESSOR;
-    PIO_IRQ(PIO0_BASE) = events;
-    return events;
+uint32_t player_events(void) {
+    return PIO_IRQ(PIO0_BASE) & FLAGS_FOR_PROCESSOR;
 }
 
 void player_stop(void) {

@@ -22,8 +22,8 @@ bool player_arm(const struct sequence* sequence);
 // Starts the timeline: the first event plays within a few ticks.
 void player_start(void);
 
-// What happened since the last call, enum player_event bits.
-uint32_t player_take_events(void);
+// What has happened since player_arm, enum player_event bits.
+uint32_t player_events(void);
 
 // Dark, machines and DMA stopped. In any state.
 void player_stop(void);

@@ -85,6 +85,7 @@ enum {
     GPIO_FUNCTION_PIO0 = 6,
     GPIO_OUTPUT_INVERTED = 1 << 8,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
+    GPIO_INPUT_INVERTED = 1 << 16,
     PAD_SCHMITT = 1 << 1,
     PAD_PULL_DOWN = 1 << 2,
     PAD_PULL_UP = 1 << 3,

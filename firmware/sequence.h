@@ -20,14 +20,6 @@ struct sequence_board {
     uint16_t shift_divider;  // of the shifter's clock
 };
 
-// A timeline event's pins, bit 0 at the first of the timeline's eight.
-enum sequence_pins {
-    PIN_LATCH = 1 << 0,
-    PIN_LIGHT_EN = 1 << 1,
-    PIN_TRIG_SHIFT = 2,  // TRIGn is bit n above this
-    PIN_SYNC = 1 << 6
-};
-
 enum {
     SEQUENCE_LATCH_TICKS = 12,  // 96 ns; TLC5926 asks for 20 ns
     SEQUENCE_EVENTS_MAX = 4 * OLS_SLOTS_MAX,
@@ -38,14 +30,16 @@ enum {
 struct sequence {
     uint32_t cycles;  // 0: until stopped
     uint16_t slot_count;
-    uint16_t pattern_words;  // of one slot
+    uint16_t pattern_words;     // of one slot
+    uint8_t inverted_triggers;  // bit n: TRIGn is active low
     uint32_t event_count;
     uint32_t events[SEQUENCE_EVENTS_MAX];
     uint32_t patterns[SEQUENCE_PATTERN_WORDS_MAX];
     struct sequence_slot {
         uint32_t period_ticks;
-        uint32_t trigger_mask;
-    } slots[OLS_SLOTS_MAX];  // what the trigger log measures against
+        int32_t trigger_offset_ticks;
+        uint32_t trigger_mask;  // that fire, by the slot's mask and kind
+    } slots[OLS_SLOTS_MAX];     // what the trigger log measures against
 };
 
 // Words of a pattern, padded to whole ones.

@@ -84,7 +84,7 @@ static bool read_witness(void) {
 
 static void follow_play(void) {
     // Events first: when all cycles are played, all triggers have fired.
-    const uint32_t events = player_take_events();
+    const uint32_t events = player_events();
     const bool on_time = read_witness();
     const uint64_t now_ticks = ticks_since_start();
     if (events & PLAYER_TIMELINE_STARVED) return end_in_fault(OLS_FAULT_TIMELINE_STARVED, now_ticks);

@@ -21,7 +21,7 @@ static uint32_t read_to;  // counter after the last entry the host has read
 static uint32_t lost;
 static uint32_t next_slot;        // where the search for the next trigger's slot begins
 static uint32_t cycle;            // of next_slot
-static uint64_t scheduled_ticks;  // rise of next_slot since the rise of slot 0 of cycle 0
+static uint64_t scheduled_ticks;  // light of next_slot since the light of slot 0 of cycle 0
 static struct ols_trigger_log_entry last;
 static int64_t first_error_ticks;  // measured minus scheduled of the first trigger: where start is on the schedule
 
@@ -66,7 +66,8 @@ bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
                                           .slot = (uint16_t)next_slot,
                                           .trigger_mask = (uint16_t)played->slots[next_slot].trigger_mask};
     entries[fired % LOG_ENTRIES] = last;
-    const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks;
+    const int64_t error_ticks =
+        (int64_t)last.rise_ticks - (int64_t)scheduled_ticks - played->slots[next_slot].trigger_offset_ticks;
     if (fired == 0) first_error_ticks = error_ticks;
     fired++;
     step_slot();

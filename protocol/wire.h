@@ -19,6 +19,7 @@ OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-e
 #define OLS_FRAME_SYNC 0x534c       // bytes 4c 53, "LS"
 #define OLS_PAYLOAD_BYTES_MAX 1024  // of one frame
 #define OLS_SLOTS_MAX 1024          // of one program
+#define OLS_TRIGGERS 4              // TRIG0 to TRIG3
 #define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
 #define OLS_LOG_ENTRIES_MAX 48      // of one reply
 #define OLS_NO_SLOT 0xffff          // where no slot is to blame
@@ -56,7 +57,7 @@ struct ols_hello {
 } OLS_PACKED;
 
 enum ols_capability {
-    OLS_CAN_OFFSET_TRIGGERS = 1  // trigger_offset_ticks may differ from 0
+    OLS_CAN_OFFSET_TRIGGERS = 1  // triggers may have offsets, widths and polarities of their own
 };
 
 struct ols_hello_reply {
@@ -72,6 +73,15 @@ struct ols_hello_reply {
     uint32_t slot_gap_ticks;  // period_ticks - exposure_ticks must be at least this
 } OLS_PACKED;
 
+// One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
+struct ols_trigger {
+    int32_t offset_ticks;  // of its rise, added to each slot's own; before the light when negative
+    uint32_t width_ticks;  // 0: the slot's exposure
+    uint8_t skip_kinds;    // bit k: does not fire in slots of kind k
+    uint8_t active_low;    // 1: the pin idles high and is low while the camera is to expose
+    uint16_t reserved;     // 0
+} OLS_PACKED;
+
 // The program follows in chunks: slot_count times an ols_slot and its ceil(chain_bits / 32) pattern words.
 struct ols_load_begin {
     uint16_t slot_count;  // 1..OLS_SLOTS_MAX
@@ -79,6 +89,8 @@ struct ols_load_begin {
     uint32_t cycles;      // 0: until stopped
     uint32_t program_bytes;
     uint32_t program_crc32;
+    uint32_t lead_ticks;  // dark before a cycle's first latch, taken from its last slot: room for early triggers
+    struct ols_trigger triggers[4];  // OLS_TRIGGERS
 } OLS_PACKED;
 
 struct ols_load_chunk {
@@ -97,9 +109,9 @@ struct ols_slot {
     uint8_t kind;                  // enum ols_slot_kind
     uint8_t trigger_mask;          // bit n: TRIGn
     uint16_t reserved;             // 0
-    uint32_t exposure_ticks;       // of trigger and light
-    uint32_t period_ticks;         // trigger rise to the next slot's trigger rise
-    int32_t trigger_offset_ticks;  // 0 without OLS_CAN_OFFSET_TRIGGERS
+    uint32_t exposure_ticks;       // of the light
+    uint32_t period_ticks;         // from this slot's light to the next slot's
+    int32_t trigger_offset_ticks;  // from the light to the triggers, before it when negative
 } OLS_PACKED;
 
 enum ols_state {
@@ -177,7 +189,8 @@ struct ols_error_reply {
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 64, "hello reply");
-OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 16, "load begin");
+OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
+OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
 OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 40, "status reply");

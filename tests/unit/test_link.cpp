@@ -74,8 +74,13 @@ class Link : public testing::Test {
     }
 
     static ols_load_begin begin_for(const Bytes& program, uint32_t cycles) {
-        return {uint16_t(program.size() / 40), 176, cycles, uint32_t(program.size()),
-                ols_crc32(0, program.data(), program.size())};
+        ols_load_begin begin{};
+        begin.slot_count = uint16_t(program.size() / 40);
+        begin.chain_bits = 176;
+        begin.cycles = cycles;
+        begin.program_bytes = uint32_t(program.size());
+        begin.program_crc32 = ols_crc32(0, program.data(), program.size());
+        return begin;
     }
 
     Reply load(const Bytes& program, uint32_t cycles = 1) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <random>
@@ -26,6 +27,8 @@ struct Slot {
 struct Program {
     sequence_board board{176, 1};
     uint32_t cycles = 1;
+    uint32_t lead_ticks = 0;
+    ols_trigger triggers[OLS_TRIGGERS]{};
     std::vector<Slot> slots;
 
     std::vector<uint8_t> bytes() const {
@@ -55,6 +58,8 @@ Compiled compile(const Program& program) {
     header.chain_bits = program.board.chain_bits;
     header.cycles = program.cycles;
     header.program_bytes = uint32_t(bytes.size());
+    header.lead_ticks = program.lead_ticks;
+    std::copy(std::begin(program.triggers), std::end(program.triggers), header.triggers);
     Compiled result;
     result.ok = sequence_compile(&program.board, &header, bytes.data(), result.words.get(), &result.error);
     return result;
@@ -80,7 +85,7 @@ Program random_program(std::mt19937& random, uint16_t chain_bits, int slot_count
     const int words = (chain_bits + 31) / 32;
     const uint32_t shift_ticks = sequence_shift_ticks(&program.board), gap_ticks = sequence_slot_gap_ticks();
     for (int n = 0; n < slot_count; n++) {
-        const uint32_t exposure_ticks = 7 + random() % 4000;
+        const uint32_t exposure_ticks = 16 + random() % 4000;
         const uint32_t spare_ticks = random() % 3 ? random() % 2000 : 0;
         const uint32_t period_ticks = std::max(exposure_ticks, shift_ticks) + gap_ticks + spare_ticks;
         Slot made = slot(ols_slot_kind(random() % 4), exposure_ticks, period_ticks, words, uint8_t(random() % 16));
@@ -92,14 +97,85 @@ Program random_program(std::mt19937& random, uint16_t chain_bits, int slot_count
     return program;
 }
 
+// Gives a program a lead, and its triggers and slots random offsets, widths and kinds. Not all of it can be played.
+void randomise_triggers(std::mt19937& random, Program& program) {
+    const auto between = [&](int low, int high) { return low + int(random() % uint32_t(high - low + 1)); };
+    program.lead_ticks = random() % 2 ? 0 : uint32_t(between(0, 1500));
+    program.slots.back().header.period_ticks += program.lead_ticks + 1000;
+    for (ols_trigger& trigger : program.triggers) {
+        trigger.offset_ticks = random() % 2 ? 0 : between(-1000, 1000);
+        trigger.width_ticks = random() % 2 ? 0 : uint32_t(between(8, 1500));
+        trigger.skip_kinds = random() % 3 ? 0 : uint8_t(random() % 16);
+        trigger.active_low = random() % 2;
+    }
+    for (Slot& slot : program.slots)
+        if (random() % 3 == 0) slot.header.trigger_offset_ticks = between(-300, 300);
+}
+
+struct Pulse {
+    int64_t rise, fall;
+    bool operator==(const Pulse&) const = default;
+};
+
+// What trigger n does in one cycle, from the program alone: ticks since the light of slot 0.
+std::vector<Pulse> trigger_pulses(const Program& program, int n) {
+    const ols_trigger& trigger = program.triggers[n];
+    std::vector<Pulse> pulses;
+    int64_t light = 0;
+    for (const Slot& slot : program.slots) {
+        if (slot.header.trigger_mask >> n & 1 && !(trigger.skip_kinds >> slot.header.kind & 1)) {
+            const int64_t rise = light + slot.header.trigger_offset_ticks + trigger.offset_ticks;
+            pulses.push_back({rise, rise + (trigger.width_ticks ? trigger.width_ticks : slot.header.exposure_ticks)});
+        }
+        light += slot.header.period_ticks;
+    }
+    return pulses;
+}
+
+uint64_t cycle_ticks(const Program& program) {
+    uint64_t ticks = 0;
+    for (const Slot& slot : program.slots) ticks += slot.header.period_ticks;
+    return ticks;
+}
+
+// Whether the rules of PROTOCOL.md allow the program's triggers: inside the cycle, not over each other, and every two
+// moments at which something begins coincide or are 8 ticks apart.
+bool triggers_can_be_played(const Program& program) {
+    const int64_t begin = -int64_t(program.lead_ticks) - SEQUENCE_LATCH_TICKS;
+    const int64_t end = begin + int64_t(cycle_ticks(program)) - 8;
+    std::vector<int64_t> moments = {begin, end};
+    int64_t light = 0;
+    for (const Slot& slot : program.slots) {
+        const int64_t shift = sequence_shift_ticks(&program.board);
+        const int64_t lit = slot.header.kind == OLS_DARK ? 8 : slot.header.exposure_ticks;
+        const int64_t sent = lit >= shift ? lit : std::max(lit + 8, shift);
+        moments.insert(moments.end(), {light - SEQUENCE_LATCH_TICKS, light, light + lit, light + sent});
+        light += slot.header.period_ticks;
+    }
+    for (int n = 0; n < OLS_TRIGGERS; n++) {
+        int64_t earliest = begin;
+        for (const Pulse& pulse : trigger_pulses(program, n)) {
+            if (pulse.rise < earliest || pulse.fall > end) return false;
+            earliest = pulse.fall + 8;
+            moments.insert(moments.end(), {pulse.rise, pulse.fall});
+        }
+    }
+    std::sort(moments.begin(), moments.end());
+    for (size_t n = 1; n < moments.size(); n++) {
+        const int64_t apart = moments[n] - moments[n - 1];
+        if (apart != 0 && apart < 8) return false;
+    }
+    return true;
+}
+
 // Pins of the interpreter, timeline first as on the board.
 enum { LATCH, LIGHT_EN, TRIG0, SYNC = 6, DATA = 8, CLK = 9 };
 
 // Both machines, the chain of drivers behind them, and what happened: one entry for each LATCH.
 struct Stage {
     struct Played {
-        uint64_t latch = 0, light_on = 0, light_off = 0;
-        uint64_t trigger_on[4]{}, trigger_off[4]{};
+        int64_t latch = 0;
+        Pulse light{0, 0};
         bool sync = false;
         std::vector<bool> lamps;
     };
@@ -109,6 +185,7 @@ struct Stage {
     PioMachine shifter{block, SHIFTER_PROGRAM, SHIFTER_WRAP_TARGET, SHIFTER_WRAP};
     std::vector<bool> chain;
     std::vector<Played> played;
+    std::vector<Pulse> triggers[4];
     uint64_t now = 0;
     uint32_t pins_before = 0;
 
@@ -157,43 +234,55 @@ struct Stage {
         if (up >> CLK & 1) chain.push_back(block.pins >> DATA & 1);
         if (up >> LATCH & 1) {
             Played next;
-            next.latch = now;
+            next.latch = int64_t(now);
             next.lamps = std::exchange(chain, {});
             next.sync = block.pins >> SYNC & 1;
             played.push_back(next);
         }
-        if (played.empty()) return;
-        if (up >> LIGHT_EN & 1) played.back().light_on = now;
-        if (down >> LIGHT_EN & 1) played.back().light_off = now;
+        if (up >> LIGHT_EN & 1) played.back().light.rise = int64_t(now);
+        if (down >> LIGHT_EN & 1) played.back().light.fall = int64_t(now);
         for (int n = 0; n < 4; n++) {
-            if (up >> (TRIG0 + n) & 1) played.back().trigger_on[n] = now;
-            if (down >> (TRIG0 + n) & 1) played.back().trigger_off[n] = now;
+            if (up >> (TRIG0 + n) & 1) triggers[n].push_back({int64_t(now), 0});
+            if (down >> (TRIG0 + n) & 1) triggers[n].back().fall = int64_t(now);
         }
     }
 };
 
 void expect_plays_program(const Stage& stage, const Program& program) {
     ASSERT_EQ(stage.played.size(), program.slots.size() * program.cycles);
-    uint64_t rise = stage.played[0].latch + SEQUENCE_LATCH_TICKS;
+    const int64_t first_light = stage.played[0].latch + SEQUENCE_LATCH_TICKS;
+    int64_t light = first_light;
     for (size_t n = 0; n < stage.played.size(); n++) {
         SCOPED_TRACE("slot " + std::to_string(n));
         const Stage::Played& played = stage.played[n];
         const Slot& slot = program.slots[n % program.slots.size()];
-        const uint64_t fall = rise + slot.header.exposure_ticks;
-        for (int trigger = 0; trigger < 4; trigger++) {
-            const bool fires = slot.header.trigger_mask >> trigger & 1;
-            EXPECT_EQ(played.trigger_on[trigger], fires ? rise : 0);
-            EXPECT_EQ(played.trigger_off[trigger], fires ? fall : 0);
-        }
         const bool lit = slot.header.kind != OLS_DARK;
-        EXPECT_EQ(played.light_on, lit ? rise : 0);
-        EXPECT_EQ(played.light_off, lit ? fall : 0);
+        EXPECT_EQ(played.latch, light - SEQUENCE_LATCH_TICKS);
+        EXPECT_EQ(played.light, lit ? (Pulse{light, light + slot.header.exposure_ticks}) : (Pulse{0, 0}));
         EXPECT_EQ(played.sync, n % program.slots.size() == 0);
         ASSERT_EQ(played.lamps.size(), program.board.chain_bits);
         for (int bit = 0; bit < program.board.chain_bits; bit++)
             ASSERT_EQ(played.lamps[bit], bit_of(slot.pattern, bit)) << "bit " << bit;
-        rise += slot.header.period_ticks;
+        light += slot.header.period_ticks;
     }
+    for (int n = 0; n < OLS_TRIGGERS; n++) {
+        std::vector<Pulse> expected;
+        for (uint32_t cycle = 0; cycle < program.cycles; cycle++)
+            for (const Pulse& pulse : trigger_pulses(program, n)) {
+                const int64_t origin = first_light + int64_t(cycle * cycle_ticks(program));
+                expected.push_back({origin + pulse.rise, origin + pulse.fall});
+            }
+        EXPECT_EQ(stage.triggers[n], expected) << "trigger " << n;
+    }
+}
+
+void expect_plays_to_the_end(const Program& program, const sequence& words) {
+    Stage stage(program, words);
+    stage.arm();
+    stage.run(20'000'000);
+    EXPECT_EQ(stage.block.flags & 7, 1u << 1) << "ends by having played all cycles";
+    EXPECT_EQ(stage.block.pins & 0xff, 0u);
+    expect_plays_program(stage, program);
 }
 
 TEST(Sequence, random_programs_play_exactly_their_lamps_and_times) {
@@ -205,14 +294,38 @@ TEST(Sequence, random_programs_play_exactly_their_lamps_and_times) {
             program.cycles = 1 + random() % 3;
             const Compiled compiled = compile(program);
             ASSERT_TRUE(compiled.ok) << compiled.error.text;
-            Stage stage(program, *compiled.words);
-            stage.arm();
-            stage.run(10'000'000);
-            EXPECT_EQ(stage.block.flags & 7, 1u << 1) << "ends by having played all cycles";
-            EXPECT_EQ(stage.block.pins & 0xff, 0u);
-            expect_plays_program(stage, program);
+            expect_plays_to_the_end(program, *compiled.words);
         }
     }
+}
+
+TEST(Sequence, triggers_with_offsets_and_widths_play_exactly_when_the_rules_allow_them_and_are_refused_otherwise) {
+    std::mt19937 random(21);
+    int played = 0, refused = 0;
+    for (int repeat = 0; repeat < 400; repeat++) {
+        SCOPED_TRACE("program " + std::to_string(repeat));
+        Program program = random_program(random, 16, 1 + int(random() % 5));
+        program.cycles = 1 + random() % 3;
+        randomise_triggers(random, program);
+        const Compiled compiled = compile(program);
+        if (program.lead_ticks != 0 && program.lead_ticks < 8) continue;  // refused for that
+        ASSERT_EQ(compiled.ok, triggers_can_be_played(program)) << compiled.error.text;
+        if (compiled.ok) expect_plays_to_the_end(program, *compiled.words);
+        (compiled.ok ? played : refused)++;
+    }
+    EXPECT_GT(played, 80);
+    EXPECT_GT(refused, 80);
+}
+
+TEST(Sequence, an_early_trigger_reaches_into_the_lit_part_of_the_slot_before_it) {
+    Program program;
+    for (int n = 0; n < 4; n++) program.slots.push_back(slot(OLS_BASIS, 1500, 2000));
+    program.slots.push_back(slot(OLS_DARK, 300, 4000));
+    program.triggers[0].offset_ticks = -900;
+    program.lead_ticks = 900;
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok) << compiled.error.text;
+    expect_plays_to_the_end(program, *compiled.words);
 }
 
 TEST(Sequence, exposures_and_periods_beyond_one_event_stay_exact) {
@@ -296,7 +409,9 @@ TEST(Sequence, a_starved_shifter_never_lets_half_a_pattern_be_latched) {
         stage.run(100'000);
         EXPECT_EQ(stage.block.flags & 7, 1u << 2) << "the shifter says so";
         for (int n = 0; n < 20'000; n++) stage.tick();
-        EXPECT_EQ(stage.block.pins & 0xff & ~(1u << SYNC), 0u) << "and the timeline waits in the dark";
+        // A trigger that is up may stay so until the processor has stopped everything.
+        EXPECT_EQ(stage.block.pins >> LIGHT_EN & 1, 0u) << "and the timeline waits in the dark";
+        EXPECT_EQ(stage.block.pins >> LATCH & 1, 0u);
         EXPECT_EQ(stage.played.size(), words / compiled.words->pattern_words);
         for (const Stage::Played& played : stage.played) EXPECT_EQ(played.lamps.size(), 176u);
     }
@@ -322,7 +437,7 @@ TEST(Sequence, the_shortest_period_that_is_accepted_plays) {
     // The shortest period that is accepted plays; its shift ends just before the sync asks for it.
     Program program;
     const uint32_t shortest_ticks = sequence_shift_ticks(&program.board) + sequence_slot_gap_ticks();
-    program.slots = {slot(OLS_BASIS, 7, shortest_ticks),
+    program.slots = {slot(OLS_BASIS, 8, shortest_ticks),
                      slot(OLS_BASIS, shortest_ticks - sequence_slot_gap_ticks(), shortest_ticks)};
     const Compiled compiled = compile(program);
     ASSERT_TRUE(compiled.ok) << compiled.error.text;
@@ -348,8 +463,15 @@ TEST(Sequence, what_cannot_be_played_is_refused_with_slot_and_reason) {
     EXPECT_EQ(refused([](Program& p) { p.slots[2].header.kind = 4; }, "unknown kind 4"), 2);
     EXPECT_EQ(refused([](Program& p) { p.slots[1].header.trigger_mask = 16; }, "trigger mask 16"), 1);
     EXPECT_EQ(refused([](Program& p) { p.slots[3].header.reserved = 1; }, "reserved"), 3);
-    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.trigger_offset_ticks = -5; }, "offset"), 0);
-    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.exposure_ticks = 6; }, "at least 7 ticks"), 0);
+    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.trigger_offset_ticks = -20; }, "raise lead_ticks by 8"), 0);
+    EXPECT_EQ(refused([](Program& p) { p.slots[2].header.trigger_offset_ticks = 7; }, "8 ticks away"), 2);
+    EXPECT_EQ(refused([](Program& p) { p.slots[1].header.trigger_offset_ticks = 2100; }, "overlaps"), 2);
+    EXPECT_EQ(refused([](Program& p) { p.slots[3].header.trigger_offset_ticks = 2000; }, "ends after the cycle"), 3);
+    EXPECT_EQ(refused([](Program& p) { p.lead_ticks = 2000; }, "room for lead_ticks of "), 3);
+    EXPECT_EQ(refused([](Program& p) { p.lead_ticks = 5; }, "0 or at least 8"), OLS_NO_SLOT);
+    EXPECT_EQ(refused([](Program& p) { p.triggers[3].width_ticks = 7; }, "0 or at least 8"), OLS_NO_SLOT);
+    EXPECT_EQ(refused([](Program& p) { p.triggers[2].skip_kinds = 16; }, "trigger 2"), OLS_NO_SLOT);
+    EXPECT_EQ(refused([](Program& p) { p.slots[0].header.exposure_ticks = 7; }, "at least 8 ticks"), 0);
     EXPECT_EQ(refused([](Program& p) { p.slots[1].header.exposure_ticks = 2974; }, "exceed the exposure"), 1);
     EXPECT_EQ(refused([](Program& p) { p.slots[1].header.exposure_ticks = 0xffffffff; }, "exceed the exposure"), 1);
     EXPECT_EQ(refused([](Program& p) { p.slots[2].header.period_ticks = 1100; }, "slot 2: period"), 2);
@@ -377,7 +499,10 @@ TEST(Sequence, a_program_for_another_chain_is_refused) {
     Program program;
     program.slots = {slot(OLS_BASIS, 1000, 3000)};
     const std::vector<uint8_t> bytes = program.bytes();
-    const ols_load_begin header = {1, 160, 1, uint32_t(bytes.size()), 0};
+    ols_load_begin header{};
+    header.slot_count = 1;
+    header.chain_bits = 160;
+    header.program_bytes = uint32_t(bytes.size());
     sequence words;
     ols_error_reply error{};
     EXPECT_FALSE(sequence_compile(&program.board, &header, bytes.data(), &words, &error));

@@ -16,10 +16,10 @@ constexpr uint64_t first_rise = 20;  // ticks after start
 std::unique_ptr<sequence> sequence_of_four() {
     auto made = std::make_unique<sequence>();
     made->slot_count = 4;
-    made->slots[0] = {50'000, 1};
-    made->slots[1] = {60'000, 3};
-    made->slots[2] = {70'000, 2};
-    made->slots[3] = {80'000, 1};
+    made->slots[0] = {50'000, 0, 1};
+    made->slots[1] = {60'000, 0, 3};
+    made->slots[2] = {70'000, 0, 2};
+    made->slots[3] = {80'000, 0, 1};
     return made;
 }
 
@@ -63,6 +63,16 @@ TEST(TriggerLog, notices_a_trigger_that_is_not_where_it_was_scheduled) {
     }
 }
 
+TEST(TriggerLog, expects_each_trigger_at_its_own_offset) {
+    const auto played = sequence_of_four();
+    played->slots[0].trigger_offset_ticks = -4000;
+    played->slots[1].trigger_offset_ticks = 2500;
+    trigger_log_begin(played.get());
+    EXPECT_TRUE(trigger_log_add(stamp_at(20), 30));
+    EXPECT_TRUE(trigger_log_add(stamp_at(20 + 50'000 + 6500), 60'000));
+    EXPECT_FALSE(trigger_log_add(stamp_at(20 + 180'000), 190'000)) << "that one is due at 184 000";
+}
+
 TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
     const auto played = sequence_of_four();
     trigger_log_begin(played.get());
@@ -79,7 +89,7 @@ TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
 TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
     auto slow = std::make_unique<sequence>();
     slow->slot_count = 1;
-    slow->slots[0] = {4'000'000'001u, 1};  // 32 s; the stamps wrap every 68.7 s
+    slow->slots[0] = {4'000'000'001u, 0, 1};  // 32 s; the stamps wrap every 68.7 s
     trigger_log_begin(slow.get());
     for (uint64_t n = 0; n < 20; n++) {
         const uint64_t rise = first_rise + n * 4'000'000'001u;
@@ -94,7 +104,7 @@ TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
 TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
     auto fast = std::make_unique<sequence>();
     fast->slot_count = 1;
-    fast->slots[0] = {2000, 1};
+    fast->slots[0] = {2000, 0, 1};
     trigger_log_begin(fast.get());
     auto fire = [&, n = uint64_t(0)](int count) mutable {
         for (; count > 0; count--, n++) ASSERT_TRUE(trigger_log_add(stamp_at(n * 2000), n * 2000));

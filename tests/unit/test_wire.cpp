@@ -57,7 +57,7 @@ struct TwoSlots {
     struct {
         ols_slot slot;
         uint32_t words[6];
-    } slots[2] = {{{OLS_TRACKING, 3, 0, 6250, 57870, 0}, {~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}},
+    } slots[2] = {{{OLS_TRACKING, 3, 0, 6250, 57870, -500}, {~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}},
                   {{OLS_DARK, 1, 0, 51500, 57870, 0}, {}}};
 };
 
@@ -90,7 +90,16 @@ TEST(Wire, hello_and_its_reply) {
 TEST(Wire, loading) {
     const TwoSlots program;
     const uint32_t crc = ols_crc32(0, &program, sizeof program);
-    expect_golden("load_begin", OLS_LOAD_BEGIN, join(ols_load_begin{2, 176, 1000, sizeof program, crc}));
+    expect_golden(
+        "load_begin", OLS_LOAD_BEGIN,
+        join(ols_load_begin{
+            2,
+            176,
+            1000,
+            sizeof program,
+            crc,
+            2500,
+            {{-2000, 0, 0, 0, 0}, {100, 6250, 1 << OLS_BASIS | 1 << OLS_MATTE | 1 << OLS_DARK, 1, 0}, {}, {}}}));
     expect_golden("load_chunk", OLS_LOAD_CHUNK, join(ols_load_chunk{0}, program));
 }
 

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import tempfile
 import time
-import zlib
 
 from ols_board import wire
 from ols_board.usb import OK, Usb
@@ -127,8 +126,7 @@ class Link:
 
     def load(self, program, chunk_bytes=1000):
         data = wire.program_bytes(program)
-        self.ask(wire.LOAD_BEGIN, wire.LOAD_BEGIN_REQUEST.pack(len(program["slots"]), program["chain_bits"],
-                                                               program["cycles"], len(data), zlib.crc32(data)))
+        self.ask(wire.LOAD_BEGIN, wire.load_begin(program, data))
         for offset in range(0, len(data), chunk_bytes):
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)

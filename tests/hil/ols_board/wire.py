@@ -18,7 +18,8 @@ STATUS_REPLY = struct.Struct("<BBHIQQIIII")
 LOG_REPLY = struct.Struct("<IIIHH")
 LOG_ENTRY = struct.Struct("<QIIHH")
 ERROR_REPLY = struct.Struct("<HH116s")
-LOAD_BEGIN_REQUEST = struct.Struct("<HHIII")
+LOAD_BEGIN_REQUEST = struct.Struct("<HHIIII")
+TRIGGER = struct.Struct("<iIBBH")
 SLOT = struct.Struct("<BBHIIi")
 
 
@@ -50,11 +51,22 @@ def pattern_words(bits):
     return [int("".join(map(str, padded[n : n + 32])), 2) for n in range(0, len(padded), 32)]
 
 
+def load_begin(program, data):
+    """The payload that announces `data`, the slots of a program. "triggers" holds up to four dictionaries."""
+    triggers = (program.get("triggers", []) + [{}] * 4)[:4]
+    return LOAD_BEGIN_REQUEST.pack(
+        len(program["slots"]), program["chain_bits"], program["cycles"], len(data), zlib.crc32(data),
+        program.get("lead_ticks", 0)) + b"".join(
+            TRIGGER.pack(trigger.get("offset_ticks", 0), trigger.get("width_ticks", 0), trigger.get("skip_kinds", 0),
+                         trigger.get("active_low", 0), 0) for trigger in triggers)
+
+
 def program_bytes(program):
     """The slots of a program (see program.py) as they are loaded."""
     out = bytearray()
     for slot in program["slots"]:
-        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"], 0)
+        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"],
+                         slot.get("trigger_offset_ticks", 0))
         words = pattern_words(slot["bits"])
         out += struct.pack(f"<{len(words)}I", *words)
     return bytes(out)
