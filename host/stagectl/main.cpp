@@ -5,9 +5,13 @@
 int main(int argc, char** argv) {
     CLI::App app{"Controls a light stage: sequences, takes, calibration, and photographs from elsewhere."};
     app.name("stagectl");
-    app.footer("Exit codes: 0 done; 1 an error, named; else wrong arguments.");
+    app.footer("Exit codes: 0 done; 1 an error, named; 2 a take that is not complete; else wrong arguments.");
     app.require_subcommand(1);
     int exit_code = 0;
+    ols::add_run_verb(app, exit_code);
+    ols::add_status_verb(app, exit_code);
+    ols::add_sequence_verb(app, exit_code);
+    ols::add_calibrate_verb(app, exit_code);
     ols::add_ingest_verb(app, exit_code);
     CLI11_PARSE(app, argc, argv);
     return exit_code;

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The verbs of stagectl. Each adds its subcommand; its callback does the work and returns through `exit_code`: 0 done,
-// 1 an error that was printed.
+// 1 an error that was printed, 2 a take that was recorded and is not complete.
 #pragma once
 
 #include <CLI/CLI.hpp>
 
 namespace ols {
 
+void add_run_verb(CLI::App& app, int& exit_code);
+void add_status_verb(CLI::App& app, int& exit_code);
+void add_sequence_verb(CLI::App& app, int& exit_code);
+void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_ingest_verb(CLI::App& app, int& exit_code);
 
 }  // namespace ols

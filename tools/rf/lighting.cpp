@@ -101,6 +101,7 @@ Result<Lighting> make_lighting(const LightingOptions& options, const SphereCells
 
 Result<SphereCells> cells_of_lights(const std::vector<LightPosition>& lights) {
     std::vector<Vec3> directions;
+    directions.reserve(lights.size());
     for (const auto& light : lights) directions.push_back(light.direction);
     return SphereCells::make(directions);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Foretelling by a small rendering, scaled by pixels, samples and lamps.
+// Foretelling by a small rendering, scaled by pixels.
 #include "plan.hpp"
 
 #include <fmt/format.h>
@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int reduction = 4, lamp_stride = 9;
+constexpr int reduction = 6;
 
 json effects_json(const EffectSet& effects) {
     json rows = json::array();
@@ -46,9 +46,7 @@ json foretell(const Setup& setup, const std::set<std::string>& disabled) {
     const Setup small{setup.scene, setup.stage, small_camera, setup.camera_model};
     Renderer renderer(small, disabled);
 
-    std::vector<double> lit_us(renderer.lamp_count(), 0);
-    size_t shaded = 0;
-    for (size_t i = 0; i < lit_us.size(); i += lamp_stride) lit_us[i] = 1, ++shaded;
+    const std::vector<double> lit_us(renderer.lamp_count(), 1);
     renderer.expose(lit_us, 0, 0, 0);
     const double before_sums = renderer.cost().sums_s, before_sensor = renderer.cost().sensor_s;
     renderer.expose(lit_us, 0, 1, 0);
@@ -56,20 +54,20 @@ json foretell(const Setup& setup, const std::set<std::string>& disabled) {
 
     const double by_pixels =
         double(setup.camera.width) * setup.camera.height / (small_camera.width * small_camera.height);
-    const double by_lamps = shaded ? double(lit_us.size()) / double(shaded) : 0;
     json plan = {{"effects", effects_json(renderer.effects())},
                  {"primary_rays", uint64_t(setup.camera.width) * setup.camera.height * setup.scene.samples},
-                 {"lamp_points", uint64_t(cost.lamp_points * by_pixels * by_lamps)},
+                 {"lamp_points", uint64_t(double(cost.lamp_points) * by_pixels)},
                  {"moving", renderer.effects().movement() != nullptr}};
     for (json& effect : plan["effects"]) {
         const std::string name = effect["name"];
-        const double scale = name == "motion" ? 1 : is_sensor_effect(name) ? by_pixels / 2 : by_pixels * by_lamps;
+        // Two exposures were made, one is foretold.
+        const double scale = name == "motion" ? 1 : is_sensor_effect(name) ? by_pixels / 2 : by_pixels;
         effect["evaluations"] = uint64_t(double(effect["evaluations"]) * scale);
     }
-    const double sums = (cost.sums_s - before_sums) * by_pixels * by_lamps / 2;
+    const double sums = (cost.sums_s - before_sums) * by_pixels / 2;
     plan["seconds"] = {{"build", cost.build_s},
                        {"visibility", cost.visibility_s * by_pixels},
-                       {"lamps", cost.lamps_s * by_pixels * by_lamps},
+                       {"lamps", cost.lamps_s * by_pixels},
                        {"exposure", sums + (cost.sensor_s - before_sensor) * by_pixels}};
     return plan;
 }
@@ -93,6 +91,7 @@ json account(const Renderer& renderer) {
 
 std::string plan_text(const json& foretold, const json& actual) {
     const bool ran = !actual.is_null();
+    const double exposures = ran ? double(actual["exposures"]) : 1;
     std::string text = fmt::format("{:<13}{:>10}{}  {:<24} {}\n", "effect", "foretold", ran ? "    actual" : "",
                                    "evaluation", "called for by");
     for (size_t i = 0; i < foretold["effects"].size(); ++i) {
@@ -101,7 +100,9 @@ std::string plan_text(const json& foretold, const json& actual) {
         const std::string reason = caller.empty()             ? "nobody"
                                    : bool(effect["disabled"]) ? "(disabled) " + caller
                                                               : caller;
-        text += fmt::format("{:<13}{:>10}", effect["name"].get<std::string>(), count_text(effect["evaluations"]));
+        const std::string name = effect["name"];
+        const double foretold_count = double(effect["evaluations"]) * (is_sensor_effect(name) ? exposures : 1);
+        text += fmt::format("{:<13}{:>10}", name, count_text(foretold_count));
         if (ran) text += fmt::format("{:>10}", count_text(actual["effects"][i]["evaluations"]));
         text += fmt::format("  {:<24} {}\n", effect["evaluation"].get<std::string>(), reason);
     }

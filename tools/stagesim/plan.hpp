@@ -10,7 +10,8 @@
 namespace ols {
 
 // Foretells the cost of one placing of the scene under all lamps and of one exposure with half of the lamps lit, by
-// rendering a picture of a quarter of the width and height under every ninth lamp.
+// rendering a picture of a sixth of the width and height. Its rays lie farther apart and are less alike, so the foretold
+// seconds err on the high side, by up to a factor of two.
 //   effects: [{name, caller, active, disabled, evaluation, evaluations}]
 //   primary_rays, lamp_points; seconds: {build, visibility, lamps, exposure}; moving: lamps are shaded anew for each exposure
 nlohmann::json foretell(const Setup& setup, const std::set<std::string>& disabled);

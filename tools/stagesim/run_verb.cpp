@@ -68,6 +68,8 @@ class StageRun {
         patience.join();
         for (auto& camera : cameras_) camera->finish();
         if (!status) return status;
+        if (gave_up_)
+            return fail("frames waited in the ring for a reader that did not come: start the capture program first");
         if (board)
             if (const int code = board->wait(); code != 0)
                 return fail(fmt::format("the emulated board ended with status {}: its message is above", code));
@@ -140,7 +142,7 @@ class StageRun {
         bool stopping = false;
         std::string line;
         for (;;) {
-            if (!stopping && (stop_requested || finished())) {
+            if (!stopping && (stop_requested || gave_up_ || finished())) {
                 stopping = true;
                 cancelled_ = true;
                 if (!board) return Done{};
@@ -186,7 +188,7 @@ class StageRun {
             for (auto& camera : cameras_) {
                 const int64_t since_ns = camera->waiting_since_ns();
                 if (options_.once && since_ns != 0 && std::chrono::nanoseconds(now_ns - since_ns) > reader_patience)
-                    cancelled_ = true;
+                    gave_up_ = cancelled_ = true;
             }
         }
     }
@@ -220,7 +222,7 @@ class StageRun {
     std::vector<nlohmann::json> foretold_;
     std::vector<std::unique_ptr<VirtualCamera>> cameras_;
     std::optional<LineListener> listener_;
-    std::atomic<bool> cancelled_ = false, ended_ = false;
+    std::atomic<bool> cancelled_ = false, gave_up_ = false, ended_ = false;
     bool client_came_ = false, client_gone_ = false;
     uint64_t now_ = 0, quiet_since_ = 0;
 };

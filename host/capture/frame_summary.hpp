@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// FrameSummary: what the optical code sees of a frame, block means above black, and how alike two of them are.
+#pragma once
+
+#include <array>
+
+#include "image/frame.hpp"
+#include "stage/stage.hpp"
+
+namespace ols {
+
+struct FrameSummary {
+    static constexpr int grid = 8;
+    std::array<float, grid * grid> blocks{};  // mean counts above black, row-major
+    float noise = 0;                          // standard deviation of a block mean in the dark
+};
+
+// Means over an 8 x 8 grid of equal blocks (the last row and column take what is left over). The frame is at least 8
+// pixels wide and high and its samples are complete. A sample that is not finite makes its block so.
+FrameSummary summarize_frame(const Frame& frame, double black_counts, const NoiseModel& noise);
+
+// Whether no block differs from black by more than six standard deviations of its mean and `black_drift_counts`, what
+// the black level may wander between two calibrations.
+bool is_dark(const FrameSummary& summary);
+constexpr float black_drift_counts = 1;
+
+// sum |a - b| / max(sum |a|, sum |b|): 0 for equal summaries, 1 for images that share no lit block, up to 2.
+double difference(const FrameSummary& a, const FrameSummary& b);
+
+}  // namespace ols

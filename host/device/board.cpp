@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+// Requests and replies of protocol/wire.h over a Transfer.
+#include "device/board.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "layout_hash.h"
+
+namespace ols {
+
+namespace {
+
+constexpr uint32_t reply_timeout_us = 1'000'000;
+constexpr size_t packet_bytes = 64;  // full-speed bulk: a read must hold whole packets
+constexpr size_t read_bytes = (OLS_FRAME_BYTES_MAX + packet_bytes - 1) / packet_bytes * packet_bytes;
+
+template <typename T>
+std::span<const uint8_t> bytes_of(const T& value) {
+    return {reinterpret_cast<const uint8_t*>(&value), sizeof value};
+}
+
+Error refusal(std::span<const uint8_t> payload) {
+    ols_error_reply error{};
+    std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));
+    const std::string text(error.text, strnlen(error.text, sizeof error.text));
+    if (error.slot == OLS_NO_SLOT) return fail("the board refused: " + text);
+    return fail(fmt::format("the board refused: {} (slot {})", text, uint16_t(error.slot)));
+}
+
+Error wrong_reply() {
+    return fail(
+        "the board's reply has a length that this release does not know: flash the firmware of this release: "
+        "make flash");
+}
+
+}  // namespace
+
+std::string fault_text(const ols_status_reply& status) {
+    const char* text = "unknown_fault: flash the firmware of this release: make flash";
+    switch (status.fault) {
+        case OLS_FAULT_NONE: return "none";
+        case OLS_FAULT_TIMELINE_STARVED:
+            text = "timeline_starved: the next event was not ready in time; lengthen the slots' periods";
+            break;
+        case OLS_FAULT_SHIFTER_STARVED:
+            text = "shifter_starved: the next pattern was not ready in time; lengthen the slots' periods";
+            break;
+        case OLS_FAULT_SLIPPED:
+            text = "slipped: a trigger was not at its scheduled tick; check the board's clock and trigger wiring";
+            break;
+        case OLS_FAULT_HOST_LOST: text = "host_lost: the USB bus was reset or unplugged; check the cable"; break;
+        case OLS_FAULT_WATCHDOG: text = "watchdog: the processor hung and was reset; report this with its log"; break;
+        case OLS_FAULT_PROCESSOR: text = "processor: a hard fault; report this with its log"; break;
+        case OLS_FAULT_BAD_MEMORY:
+            text = "bad_memory: the program in memory changed; load it again, and check the power supply";
+            break;
+    }
+    const std::string slot =
+        status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
+    return fmt::format("{} (at tick {}{})", text, uint64_t(status.fault_ticks), slot);
+}
+
+const char* state_name(uint8_t state) {
+    switch (state) {
+        case OLS_STATE_IDLE: return "idle";
+        case OLS_STATE_LOADED: return "loaded";
+        case OLS_STATE_ARMED: return "armed";
+        case OLS_STATE_PLAYING: return "playing";
+        case OLS_STATE_DONE: return "done";
+        case OLS_STATE_FAULT: return "fault";
+        default: return "unknown";
+    }
+}
+
+Board::Board(std::unique_ptr<Transfer> transfer)
+    : transfer_(std::move(transfer)), parser_(std::make_unique<ols_frame_parser>()) {}
+
+Result<Board> Board::connect(std::unique_ptr<Transfer> transfer) {
+    Board board(std::move(transfer));
+    const ols_hello hello{OLS_LAYOUT_HASH};
+    const auto payload = board.request(OLS_HELLO, bytes_of(hello));
+    if (!payload.ok()) return payload.error();
+    // The hash comes first in every version of the reply, so it is compared before the length.
+    uint64_t layout_hash = 0;
+    std::memcpy(&layout_hash, payload->data(), std::min(payload->size(), sizeof layout_hash));
+    if (layout_hash != OLS_LAYOUT_HASH || payload->size() != sizeof board.info_)
+        return fail(
+            fmt::format("the board speaks message layout {:016x} and this program {:016x}: flash the firmware "
+                        "of this release: make flash",
+                        layout_hash, uint64_t(OLS_LAYOUT_HASH)));
+    std::memcpy(&board.info_, payload->data(), sizeof board.info_);
+    board.info_.firmware_version[sizeof board.info_.firmware_version - 1] = 0;
+    return board;
+}
+
+std::string Board::id() const {
+    std::string hex;
+    for (const uint8_t byte : info_.board_id) hex += fmt::format("{:02x}", byte);
+    return hex;
+}
+
+Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {
+    uint8_t frame[OLS_FRAME_BYTES_MAX];
+    const uint16_t request_id = ++last_request_id_;
+    const size_t frame_bytes = ols_frame_encode(type, request_id, payload.data(), payload.size(), frame, sizeof frame);
+    assert(frame_bytes > 0);
+    if (const Status sent = transfer_->write({frame, frame_bytes}, reply_timeout_us); !sent.ok()) return sent.error();
+    std::vector<uint8_t> received;
+    for (size_t taken = 0;;) {
+        ols_frame reply;
+        while (ols_frame_parser_read(parser_.get(), &reply)) {
+            // A reply to a request that was given up earlier is nobody's any more.
+            if (reply.request_id != request_id) continue;
+            const std::span<const uint8_t> content(reply.payload, reply.payload_bytes);
+            if (reply.type == (OLS_ERROR | OLS_REPLY)) return refusal(content);
+            if (reply.type == (type | OLS_REPLY)) return std::vector<uint8_t>(content.begin(), content.end());
+        }
+        if (taken == received.size()) {
+            auto bytes = transfer_->read(read_bytes, reply_timeout_us);
+            if (!bytes.ok()) return bytes.error();
+            received = std::move(*bytes);
+            taken = 0;
+        }
+        taken += ols_frame_parser_write(parser_.get(), received.data() + taken, received.size() - taken);
+    }
+}
+
+Status Board::command(uint16_t type) {
+    const auto reply = request(type, {});
+    if (!reply.ok()) return reply.error();
+    return Done{};
+}
+
+template <typename Reply>
+Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
+    const auto bytes = request(type, payload);
+    if (!bytes.ok()) return bytes.error();
+    if (bytes->size() < sizeof(Reply)) return wrong_reply();
+    Reply reply;
+    std::memcpy(&reply, bytes->data(), sizeof reply);
+    return reply;
+}
+
+Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
+    const ols_load_begin begin{slot_count, chain_bits, cycles, uint32_t(program.size()),
+                               ols_crc32(0, program.data(), program.size())};
+    if (const auto reply = request(OLS_LOAD_BEGIN, bytes_of(begin)); !reply.ok()) return reply.error();
+    constexpr size_t data_bytes_max = OLS_PAYLOAD_BYTES_MAX - sizeof(ols_load_chunk);
+    for (size_t offset = 0; offset < program.size(); offset += data_bytes_max) {
+        const ols_load_chunk chunk{uint32_t(offset)};
+        const auto data = program.subspan(offset, std::min(data_bytes_max, program.size() - offset));
+        std::vector<uint8_t> payload(sizeof chunk + data.size());
+        std::memcpy(payload.data(), &chunk, sizeof chunk);
+        std::copy(data.begin(), data.end(), payload.begin() + sizeof chunk);
+        if (const auto reply = request(OLS_LOAD_CHUNK, payload); !reply.ok()) return reply.error();
+    }
+    return command(OLS_LOAD_END);
+}
+
+Status Board::arm() {
+    return command(OLS_ARM);
+}
+
+Status Board::start() {
+    return command(OLS_START);
+}
+
+Status Board::stop() {
+    return command(OLS_STOP);
+}
+
+Status Board::clear_fault() {
+    return command(OLS_CLEAR_FAULT);
+}
+
+Result<ols_status_reply> Board::status() {
+    return ask<ols_status_reply>(OLS_STATUS);
+}
+
+Result<TriggerLog> Board::read_trigger_log(uint32_t first_counter) {
+    const ols_read_trigger_log what{first_counter, OLS_LOG_ENTRIES_MAX, 0};
+    const auto bytes = request(OLS_READ_TRIGGER_LOG, bytes_of(what));
+    if (!bytes.ok()) return bytes.error();
+    ols_trigger_log_reply head;
+    if (bytes->size() < sizeof head) return wrong_reply();
+    std::memcpy(&head, bytes->data(), sizeof head);
+    if (bytes->size() != sizeof head + head.entry_count * sizeof(ols_trigger_log_entry)) return wrong_reply();
+    TriggerLog log{{}, head.next_counter, head.entries_lost};
+    log.entries.resize(head.entry_count);
+    if (head.entry_count)
+        std::memcpy(log.entries.data(), bytes->data() + sizeof head,
+                    log.entries.size() * sizeof(ols_trigger_log_entry));
+    return log;
+}
+
+}  // namespace ols

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// Board: the sequencer board as a typed client of protocol/wire.h, one function a message.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "device/transfer.hpp"
+#include "frame.h"
+#include "wire.h"
+
+namespace ols {
+
+// What the trigger log says of one request.
+struct TriggerLog {
+    std::vector<ols_trigger_log_entry> entries;
+    uint32_t next_counter = 0;  // that the next trigger will have
+    uint32_t entries_lost = 0;  // since start: the board's log had no room
+};
+
+// "timeline_starved: ..." with what to do, for a latched fault (enum ols_fault).
+std::string fault_text(const ols_status_reply& status);
+
+const char* state_name(uint8_t state);
+
+// One request at a time; not for use by two threads at once. Every function fails when the board is gone, does not
+// answer within a second of its own time, or refuses; a refusal carries the board's own words.
+class Board {
+  public:
+    // Says hello. A board of another message layout is refused: the error says to flash this release's firmware.
+    static Result<Board> connect(std::unique_ptr<Transfer> transfer);
+
+    const ols_hello_reply& info() const { return info_; }
+    std::string id() const;  // the flash chip's unique number, in hex
+
+    // Sends a program (encode_program) of `slot_count` slots in chunks; `cycles` 0 plays until stopped.
+    Status load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles);
+    Status arm();
+    Status start();
+    Status stop();
+    Status clear_fault();
+    Result<ols_status_reply> status();
+
+    // The log from `first_counter` on, as much of it as one message holds.
+    Result<TriggerLog> read_trigger_log(uint32_t first_counter);
+
+  private:
+    explicit Board(std::unique_ptr<Transfer> transfer);
+
+    // Sends a request and waits for its reply, whose payload it returns.
+    Result<std::vector<uint8_t>> request(uint16_t type, std::span<const uint8_t> payload);
+    Status command(uint16_t type);
+    template <typename Reply>
+    Result<Reply> ask(uint16_t type, std::span<const uint8_t> payload = {});
+
+    std::unique_ptr<Transfer> transfer_;
+    std::unique_ptr<ols_frame_parser> parser_;
+    uint16_t last_request_id_ = 0;
+    ols_hello_reply info_{};
+};
+
+}  // namespace ols

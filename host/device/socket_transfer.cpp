@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT
+// USB transfers to the emulated board, carried by an AF_UNIX stream socket (docs/architecture.md).
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "device/transfer.hpp"
+
+namespace ols {
+
+namespace {
+
+constexpr uint32_t request_magic = 0x54425355;  // "USBT", little-endian
+constexpr uint32_t reply_magic = 0x52425355;    // "USBR"
+constexpr uint8_t type_bulk = 1;
+constexpr uint8_t endpoint_out = 0x01, endpoint_in = 0x82;
+
+#pragma pack(push, 1)
+struct TransferRequest {
+    uint32_t magic = request_magic, tag = 0;
+    uint8_t type = type_bulk, endpoint = 0;
+    uint16_t reserved = 0;
+    uint32_t length = 0, timeout_us = 0;
+    uint8_t setup[8] = {};
+};
+struct TransferReply {
+    uint32_t magic, tag;
+    int32_t status;
+    uint32_t length;
+};
+#pragma pack(pop)
+static_assert(sizeof(TransferRequest) == 28 && sizeof(TransferReply) == 16);
+
+const char* status_text(int32_t status) {
+    switch (status) {
+        case -1: return "the board refused the transfer (endpoint stalled)";
+        case -2: return "the board was disconnected: connect it again and start over";
+        case -3: return "the board did not answer in time: reset it and start over";
+        case -4: return "the transfer was cancelled";
+        default: return "the transfer failed";
+    }
+}
+
+class SocketTransfer : public Transfer {
+  public:
+    SocketTransfer(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
+    ~SocketTransfer() override { ::close(fd_); }
+
+    Status write(std::span<const uint8_t> bytes, uint32_t timeout_us) override {
+        if (const Status sent = request(endpoint_out, uint32_t(bytes.size()), timeout_us); !sent.ok()) return sent;
+        if (const Status sent = send_all(bytes.data(), bytes.size()); !sent.ok()) return sent;
+        const auto reply = receive_reply();
+        if (!reply.ok()) return reply.error();
+        return Done{};
+    }
+
+    Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) override {
+        if (const Status sent = request(endpoint_in, uint32_t(capacity), timeout_us); !sent.ok()) return sent.error();
+        return receive_reply();
+    }
+
+  private:
+    Status request(uint8_t endpoint, uint32_t length, uint32_t timeout_us) {
+        TransferRequest request;
+        request.tag = ++tag_;
+        request.endpoint = endpoint;
+        request.length = length;
+        request.timeout_us = timeout_us;
+        return send_all(&request, sizeof request);
+    }
+
+    // The payload of the reply to the last request; replies to transfers given up earlier are passed over.
+    Result<std::vector<uint8_t>> receive_reply() {
+        for (;;) {
+            TransferReply reply;
+            if (const Status got = receive_all(&reply, sizeof reply); !got.ok()) return got.error();
+            if (reply.magic != reply_magic)
+                return fail("'" + path_ + "' does not speak USB transfers: is it the board's socket?");
+            std::vector<uint8_t> payload(reply.length);
+            if (const Status got = receive_all(payload.data(), payload.size()); !got.ok()) return got.error();
+            if (reply.tag != tag_) continue;
+            if (reply.status != 0) return fail(status_text(reply.status));
+            return payload;
+        }
+    }
+
+    Status send_all(const void* bytes, size_t count) {
+        const auto* at = static_cast<const uint8_t*>(bytes);
+        while (count > 0) {
+            const ssize_t sent = ::send(fd_, at, count, MSG_NOSIGNAL);
+            if (sent < 0 && errno == EINTR) continue;
+            if (sent <= 0) return lost();
+            at += sent;
+            count -= size_t(sent);
+        }
+        return Done{};
+    }
+
+    Status receive_all(void* bytes, size_t count) {
+        auto* at = static_cast<uint8_t*>(bytes);
+        while (count > 0) {
+            const ssize_t got = ::recv(fd_, at, count, 0);
+            if (got < 0 && errno == EINTR) continue;
+            if (got <= 0) return lost();
+            at += got;
+            count -= size_t(got);
+        }
+        return Done{};
+    }
+
+    Error lost() const { return fail("the board at '" + path_ + "' is gone: start the stage again"); }
+
+    int fd_;
+    std::string path_;
+    uint32_t tag_ = 0;
+};
+
+Result<std::unique_ptr<Transfer>> open_socket(const std::string& path) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (path.empty() || path.size() >= sizeof address.sun_path)
+        return fail(fmt::format("socket path '{}' must have 1 to {} characters", path, sizeof address.sun_path - 1));
+    std::memcpy(address.sun_path, path.c_str(), path.size());
+    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return fail(fmt::format("cannot make a socket: {}", std::strerror(errno)));
+    if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        const int error = errno;
+        ::close(fd);
+        return fail(
+            fmt::format("cannot reach the board at '{}': {}; start the stage first", path, std::strerror(error)));
+    }
+    return std::unique_ptr<Transfer>(std::make_unique<SocketTransfer>(fd, path));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link) {
+    constexpr std::string_view socket_scheme = "socket:";
+    if (link.starts_with(socket_scheme)) return open_socket(link.substr(socket_scheme.size()));
+    return fail("'" + link + "' is no board link: write socket:PATH");
+}
+
+}  // namespace ols

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Bulk transfers to and from a board: all that the protocol above needs of USB.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "result.hpp"
+
+namespace ols {
+
+// One board's pair of bulk endpoints. Each direction is a byte stream; where a transfer ends means nothing.
+// Timeouts are in the board's time, which on the virtual stage is not the wall's; 0 is none.
+class Transfer {
+  public:
+    virtual ~Transfer() = default;
+
+    // Sends all bytes, or fails.
+    virtual Status write(std::span<const uint8_t> bytes, uint32_t timeout_us) = 0;
+
+    // Receives what the board sends next, 1 to `capacity` bytes.
+    virtual Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) = 0;
+};
+
+// "socket:PATH" is the emulated board's USB (docs/architecture.md, "USB transfers over a socket"). The error says what
+// links there are, or to start the stage first when nobody listens.
+Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link);
+
+}  // namespace ols

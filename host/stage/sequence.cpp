@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+// From sequence.toml to slots, from slots to program bytes.
+#include "stage/sequence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <numeric>
+
+#include "stage/toml_section.hpp"
+
+namespace ols {
+
+namespace {
+
+constexpr int landmarks_a_group = 2;  // tracking and matte
+
+uint32_t ticks_of_us(double us) {
+    return uint32_t(std::lround(us * double(ticks_per_us)));
+}
+
+uint32_t period_ticks_of(const SequenceConfig& config) {
+    return uint32_t(std::lround(double(tick_hz) / config.frame_rate_hz));
+}
+
+// Which basis places of the cycle are dark, as flags; `places` a group.
+std::vector<bool> choose_dark_places(int groups, int places, int dark_count) {
+    std::vector<bool> dark(size_t(groups) * places, false);
+    for (int d = 0; d < dark_count; ++d) {
+        const int group = (2 * d + 1) * groups / (2 * dark_count);
+        const int place = (2 * d + 1) * places / (2 * dark_count);
+        dark[size_t(group) * places + place] = true;
+    }
+    return dark;
+}
+
+int stride_of(int rows) {
+    const double ideal = rows / std::numbers::phi;
+    int best = 1;
+    for (int q = 1; q < rows; ++q)
+        if (std::gcd(q, rows) == 1 && std::abs(q - ideal) < std::abs(best - ideal)) best = q;
+    return best;
+}
+
+// Makes the slots of one sequence; lamps and triggers are the same for all slots of a kind but basis.
+class CycleLayout {
+  public:
+    CycleLayout(const SequenceConfig& config, const StageConfig& stage, const Basis& basis)
+        : config_(config), basis_(basis), sphere_lamps_(stage.lamps.size()), lamps_(size_t(stage.lamp_count())) {
+        for (const auto& camera : stage.cameras) trigger_mask_ |= uint8_t(1 << camera.trigger);
+    }
+
+    std::vector<Slot> lay_out() const {
+        const int places = config_.group_slots - landmarks_a_group;
+        const int groups = basis_.rows / places + 1;
+        const auto dark = choose_dark_places(groups, places, groups * places - basis_.rows);
+        const int stride = stride_of(basis_.rows);
+        std::vector<Slot> cycle;
+        int64_t basis_place = 0;
+        for (int place = 0; place < groups * places; ++place) {
+            if (place % places == 0) {
+                cycle.push_back(tracking());
+                cycle.push_back(matte());
+            }
+            if (dark[place])
+                cycle.push_back(unlit(SlotKind::dark, config_.basis_exposure_us));
+            else
+                cycle.push_back(basis_row(int(basis_place++ * stride % basis_.rows)));
+        }
+        return cycle;
+    }
+
+  private:
+    // A dark slot is exposed as long as a basis slot, so that it shows the black level that these have.
+    Slot unlit(SlotKind kind, double exposure_us) const {
+        Slot slot;
+        slot.kind = kind;
+        slot.lit.assign(lamps_, 0);
+        slot.exposure_ticks = ticks_of_us(exposure_us);
+        slot.period_ticks = period_ticks_of(config_);
+        slot.trigger_mask = trigger_mask_;
+        return slot;
+    }
+    Slot tracking() const {
+        Slot slot = unlit(SlotKind::tracking, config_.tracking_exposure_us);
+        if (config_.tracking_lamps.empty()) std::fill_n(slot.lit.begin(), sphere_lamps_, uint8_t(1));
+        for (const int lamp : config_.tracking_lamps) slot.lit[size_t(lamp)] = 1;
+        return slot;
+    }
+    Slot matte() const {
+        Slot slot = unlit(SlotKind::matte, config_.matte_exposure_us);
+        std::fill(slot.lit.begin() + ptrdiff_t(sphere_lamps_), slot.lit.end(), uint8_t(1));
+        return slot;
+    }
+    Slot basis_row(int row) const {
+        Slot slot = unlit(SlotKind::basis, config_.basis_exposure_us);
+        slot.row = row;
+        for (int lamp = 0; lamp < basis_.lamps; ++lamp) slot.lit[size_t(lamp)] = basis_.lit(row, lamp);
+        return slot;
+    }
+
+    const SequenceConfig& config_;
+    const Basis& basis_;
+    size_t sphere_lamps_, lamps_;
+    uint8_t trigger_mask_ = 1;  // the board logs TRIG0 only, so every slot fires it
+};
+
+Status check_exposures(const SequenceConfig& config) {
+    const uint32_t period_ticks = period_ticks_of(config);
+    const std::pair<const char*, double> exposures[] = {{"basis", config.basis_exposure_us},
+                                                        {"tracking", config.tracking_exposure_us},
+                                                        {"matte", config.matte_exposure_us}};
+    for (const auto& [name, exposure_us] : exposures)
+        if (ticks_of_us(exposure_us) >= period_ticks)
+            return fail(
+                fmt::format("the {} exposure of {} us does not fit the {:.1f} us between frames at {} frames "
+                            "a second: shorten it or lower frame_rate_hz",
+                            name, exposure_us, double(period_ticks) / double(ticks_per_us), config.frame_rate_hz));
+    return Done{};
+}
+
+}  // namespace
+
+const char* slot_kind_name(SlotKind kind) {
+    switch (kind) {
+        case SlotKind::basis: return "basis";
+        case SlotKind::tracking: return "tracking";
+        case SlotKind::matte: return "matte";
+        case SlotKind::dark: return "dark";
+    }
+    return "";
+}
+
+uint64_t Sequence::cycle_ticks() const {
+    uint64_t ticks = 0;
+    for (const Slot& slot : slots) ticks += slot.period_ticks;
+    return ticks;
+}
+
+Result<SequenceConfig> read_sequence(const std::string& path) {
+    auto file = TomlSection::open(path);
+    if (!file.ok()) return file.error();
+    SequenceConfig config;
+    file->read("basis", config.basis);
+    file->read("frame_rate_hz", config.frame_rate_hz, 1, 100'000);
+    file->read("cycles", config.cycles, 1, 1'000'000);
+    file->read("group_slots", config.group_slots, 3, OLS_SLOTS_MAX);
+    TomlSection exposure = file->section("exposure_us");
+    exposure.read("basis", config.basis_exposure_us, 1, 1e6);
+    exposure.read("tracking", config.tracking_exposure_us, 1, 1e6);
+    exposure.read("matte", config.matte_exposure_us, 1, 1e6);
+    file->read("tracking_lamps", config.tracking_lamps, 0, OLS_CHAIN_BITS_MAX - 1);
+    if (const Status status = file->finish(); !status.ok()) return status.error();
+    if (const auto basis = find_basis(config.basis); !basis.ok()) return fail(path + ": " + basis.error().message);
+    if (const Status status = check_exposures(config); !status.ok()) return fail(path + ": " + status.error().message);
+    return config;
+}
+
+Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage) {
+    auto basis = find_basis(config.basis);
+    if (!basis.ok()) return basis.error();
+    if (basis->lamps != int(stage.lamps.size()))
+        return fail(fmt::format("basis {} is for {} lamps and the stage has {} on its sphere: choose another basis",
+                                config.basis, basis->lamps, stage.lamps.size()));
+    for (const int lamp : config.tracking_lamps)
+        if (lamp >= stage.lamp_count())
+            return fail(fmt::format("tracking_lamps names lamp {}, and the stage has {}", lamp, stage.lamp_count()));
+    if (const Status status = check_exposures(config); !status.ok()) return status.error();
+
+    Sequence sequence{config, std::move(*basis), {}};
+    sequence.slots = CycleLayout(config, stage, sequence.basis).lay_out();
+    if (sequence.slots.size() > OLS_SLOTS_MAX)
+        return fail(
+            fmt::format("the cycle has {} slots and the board plays {}: choose longer groups or a basis of "
+                        "fewer rows",
+                        sequence.slots.size(), OLS_SLOTS_MAX));
+    std::vector<SlotKind> kinds;
+    for (const Slot& slot : sequence.slots) kinds.push_back(slot.kind);
+    if (!has_unique_order(kinds))
+        return fail(
+            "the order of tracking, matte and dark slots repeats within the cycle, so that a frame's slot "
+            "could not be proved: choose another group_slots");
+    return sequence;
+}
+
+bool has_unique_order(const std::vector<SlotKind>& cycle) {
+    std::vector<SlotKind> turned = cycle;
+    for (size_t turn = 1; turn < cycle.size(); ++turn) {
+        std::rotate(turned.begin(), turned.begin() + 1, turned.end());
+        if (turned == cycle) return false;
+    }
+    return !cycle.empty();
+}
+
+std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage) {
+    const size_t words = (size_t(stage.chain_bits) + 31) / 32;
+    std::vector<uint8_t> bytes;
+    for (const Slot& slot : sequence.slots) {
+        ols_slot head{};
+        head.kind = uint8_t(slot.kind);
+        head.trigger_mask = slot.trigger_mask;
+        head.exposure_ticks = slot.exposure_ticks;
+        head.period_ticks = slot.period_ticks;
+        std::vector<uint32_t> pattern(words, 0);
+        for (size_t lamp = 0; lamp < slot.lit.size(); ++lamp) {
+            const int bit = stage.chain_bit_of_lamp[lamp];
+            if (slot.lit[lamp]) pattern[size_t(bit) / 32] |= 1u << (31 - bit % 32);
+        }
+        const size_t at = bytes.size();
+        bytes.resize(at + sizeof head + words * sizeof(uint32_t));
+        std::memcpy(&bytes[at], &head, sizeof head);
+        std::memcpy(&bytes[at + sizeof head], pattern.data(), words * sizeof(uint32_t));
+    }
+    return bytes;
+}
+
+}  // namespace ols

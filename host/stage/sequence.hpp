@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// Sequences: sequence.toml compiled into the slots of a cycle, and those into the program that the board plays.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "result.hpp"
+#include "stage/basis.hpp"
+#include "stage/stage.hpp"
+#include "wire.h"
+
+namespace ols {
+
+constexpr uint64_t tick_hz = 125'000'000;  // the board's clock
+constexpr uint64_t ticks_per_us = tick_hz / 1'000'000;
+
+enum class SlotKind : uint8_t { basis = OLS_BASIS, tracking = OLS_TRACKING, matte = OLS_MATTE, dark = OLS_DARK };
+
+const char* slot_kind_name(SlotKind kind);
+
+// What sequence.toml says.
+struct SequenceConfig {
+    std::string basis = "single";
+    double frame_rate_hz = 2160;  // of the cameras; the paper's
+    int cycles = 1;
+    int group_slots = 18;  // tracking, matte and this many less two places for the basis (Wenger 4)
+    // One lamp fits 412 us of the 463 us between frames. A multiplexed basis lights half the lamps at once and
+    // saturates skin there: 100 us (Wenger 5.3). All lamps together leave 50 us for tracking.
+    double basis_exposure_us = 412;
+    double tracking_exposure_us = 50;
+    double matte_exposure_us = 412;
+    std::vector<int> tracking_lamps;  // empty: all on the sphere
+};
+
+struct Slot {
+    SlotKind kind = SlotKind::dark;
+    int row = -1;                 // of the basis, for SlotKind::basis
+    std::vector<uint8_t> lit;     // a 0/1 for each lamp of the stage, sphere first
+    uint32_t exposure_ticks = 0;  // of light and trigger
+    uint32_t period_ticks = 0;    // to the next slot's trigger rise
+    uint8_t trigger_mask = 1;
+};
+
+struct Sequence {
+    SequenceConfig config;
+    Basis basis;
+    std::vector<Slot> slots;  // one cycle
+
+    uint64_t cycle_ticks() const;
+    uint64_t trigger_count() const { return uint64_t(config.cycles) * slots.size(); }
+};
+
+// Reads sequence.toml; absent keys have the defaults above. Unknown keys and values out of range are errors that name
+// file, line and key.
+Result<SequenceConfig> read_sequence(const std::string& path);
+
+// Lays out the cycle: groups of tracking, matte and basis places, as many as hold every row of the basis and at least
+// one dark slot. Row p * q mod rows stands at basis place p, where q, coprime to the rows, is nearest to rows / golden
+// ratio: rows that follow each other are far apart in the basis, so that neighbouring lamps do not light in turn and
+// a lamp's on-times do not cluster. Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
+// place of its own: no two dark slots have the same distance to their group's tracking slot, so that each of them
+// alone tells where in the cycle it is.
+// Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;
+// an order of kinds that some rotation repeats (see has_unique_order).
+Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage);
+
+// The optical code: whether no rotation of the cycle but the whole turn gives the same order of kinds, so that what a
+// camera sees of it fixes the slot.
+bool has_unique_order(const std::vector<SlotKind>& cycle);
+
+// The bytes of OLS_LOAD_CHUNK (protocol/wire.h): for each slot an ols_slot and its pattern in chain order.
+std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage);
+
+}  // namespace ols

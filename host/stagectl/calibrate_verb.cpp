@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// stagectl calibrate: black level and flat field from a white card.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "capture/card.hpp"
+#include "stagectl/session.hpp"
+#include "stagectl/verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct Options {
+    LinkOptions links;
+    CardOptions card;
+    std::string output;
+    bool json = false;
+};
+
+Result<int> run(const Options& options) {
+    auto session = open_session(options.links);
+    if (!session.ok()) return session.error();
+    const auto card =
+        calibrate_with_card(*session->board, *session->camera, session->stage, options.card, stop_on_signal(),
+                            [](uint64_t decided, uint64_t total) { show_progress("calibrating", decided, total); });
+    if (!card.ok()) return card.error();
+    if (Status s = write_calibration(options.output, card->calibration, card->record); !s.ok()) return s.error();
+    if (options.json) {
+        const nlohmann::json json = {{"calibration", options.output},
+                                     {"frames", card->record.frames},
+                                     {"slots_missing", card->report.slots_missing},
+                                     {"exposure_us", card->record.card_exposure_us},
+                                     {"black_counts", card->black_mean},
+                                     {"flat_counts_per_us", card->flat_mean},
+                                     {"brightest_share", card->brightest}};
+        fmt::print("{}\n", json.dump(1));
+    } else {
+        fmt::print(
+            "{}: {} frames of card and of dark at {:.2f} us; black {:.2f} counts, flat {:.4f} counts a "
+            "microsecond, card at {:.0f} % of the range at most\n",
+            options.output, card->record.frames, card->record.card_exposure_us, card->black_mean, card->flat_mean,
+            card->brightest * 100);
+    }
+    return 0;
+}
+
+}  // namespace
+
+void add_calibrate_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<Options>();
+    CLI::App* verb =
+        app.add_subcommand("calibrate", "measure black level and flat field with a white card that fills the view");
+    verb->footer(
+        "Example: stagectl calibrate --stage examples/stage.toml --board socket:run/board.sock \\\n"
+        "           --camera ring:run/cam0.ring --card 0.985 -o cal\n"
+        "The card stands at the stage's centre and faces the camera. All lamps flash; nothing is written when a sample "
+        "saturates,\nthe card is too dark or does not fill the view.");
+    options->links.add_to(*verb, true);
+    verb->add_option("--card", options->card.reflectance, "reflectance of the card")->check(CLI::Range(0.01, 1.0));
+    verb->add_option("--exposure-us", options->card.exposure_us, "exposure; otherwise chosen from the camera's gain")
+        ->check(CLI::Range(0.1, 400.0));
+    verb->add_option("--cycles", options->card.cycles, "times 8 frames are averaged")->check(CLI::Range(1, 10'000));
+    verb->add_option("-o,--output", options->output, "folder to write")->required();
+    verb->add_flag("--json", options->json, "print as JSON");
+    verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
+}
+
+}  // namespace ols

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+// stagectl run: plays a sequence and records the take.
+#include <fmt/format.h>
+
+#include "capture/take.hpp"
+#include "stagectl/session.hpp"
+#include "stagectl/verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct Options {
+    LinkOptions links;
+    std::string sequence, output, calibration;
+    TakeInfo slate;
+    int cycles = 0;
+    bool nominal = false, overwrite = false, single_float = false, json = false;
+};
+
+Result<Calibration> open_calibration(const Options& options, const StageConfig& stage) {
+    const std::string folder = options.calibration.empty() ? stage.calibration_dir : options.calibration;
+    if (options.nominal) return nominal_calibration(stage);
+    if (folder.empty())
+        return fail(
+            "no calibration: run `stagectl calibrate` and give --calibration DIR (or calibration in the "
+            "stage), or give --nominal to take black level and gain as the stage states them");
+    return read_calibration(folder, stage);
+}
+
+TakeInfo describe_take(const Options& options, const Sequence& sequence, const StageConfig& stage) {
+    TakeInfo info = options.slate;
+    info.frame_rate_hz = double(tick_hz) / double(sequence.cycle_ticks());
+    info.basis = sequence.basis.name;
+    info.value_unit = "reflectance";
+    info.lights = stage.lamps;
+    info.sample_type = options.single_float ? SampleType::single_float : SampleType::half_float;
+    return info;
+}
+
+nlohmann::json to_json(const TakeReport& report, const Options& options) {
+    const RecordReport& record = report.record;
+    return {{"archive", options.output},
+            {"slots_total", record.slots_total},
+            {"slots_missing", record.slots_missing},
+            {"frames", record.frames},
+            {"frames_discarded", record.frames_discarded},
+            {"frames_dropped_by_camera", record.frames_dropped_by_camera},
+            {"duplicates", record.duplicates},
+            {"camera_restarts", record.camera_restarts},
+            {"clock_drift_ppm", record.clock_drift_ppm},
+            {"board_end", record.board_end},
+            {"targets_written", report.targets_written},
+            {"targets_missing", report.targets_missing},
+            {"write_error", report.write_error},
+            {"seconds",
+             {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
+}
+
+void print_report(const TakeReport& report, const Options& options) {
+    const RecordReport& record = report.record;
+    if (!options.json)
+        fmt::print("{}: {} targets written, {} missing; {} of {} slots missing; {:.1f} s\n", options.output,
+                   report.targets_written, report.targets_missing, record.slots_missing, record.slots_total,
+                   report.seconds_total);
+    if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
+    if (!record.unfit_frame.empty())
+        fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
+                   record.unfit_frame);
+    if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
+    if (record.slots_missing > 0)
+        fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
+                   options.output);
+}
+
+Result<int> run(const Options& options) {
+    auto config = read_sequence(options.sequence);
+    if (!config.ok()) return config.error();
+    if (options.cycles > 0) config->cycles = options.cycles;
+    const auto stage = open_stage(options.links);
+    if (!stage.ok()) return stage.error();
+    const auto sequence = compile_sequence(*config, *stage);
+    if (!sequence.ok()) return sequence.error();
+    const auto calibration = open_calibration(options, *stage);
+    if (!calibration.ok()) return calibration.error();
+    auto session = open_session(options.links);
+    if (!session.ok()) return session.error();
+    auto archive = ArchiveWriter::create(options.output, describe_take(options, *sequence, *stage), options.overwrite);
+    if (!archive.ok()) return archive.error();
+
+    const auto report =
+        run_take(*session->board, *session->camera, *sequence, *stage, *calibration, *archive, stop_on_signal(),
+                 [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
+    if (!report.ok()) return report.error();
+    print_report(*report, options);
+    if (options.json) fmt::print("{}\n", to_json(*report, options).dump(1));
+    if (!report->write_error.empty()) return 1;
+    return report->targets_missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
+}
+
+}  // namespace
+
+void add_run_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("run", "play a sequence on the stage and record the take");
+    verb->footer(
+        "Example: stagectl run --sequence examples/sequence_s159.toml --stage examples/stage.toml \\\n"
+        "           --board socket:run/board.sock --camera ring:run/cam0.ring --calibration cal -o take.rfa\n"
+        "Ctrl-C turns the light off and finishes the archive with what was recorded; a second one ends at once.\n"
+        "Exit codes: 0 every slot was recorded; 1 an error; 2 the archive is finished, and slots or targets are "
+        "missing.\nFlashing light can trigger seizures: see `stagectl sequence`.");
+    verb->add_option("--sequence", options->sequence, "sequence.toml")->required();
+    options->links.add_to(*verb, true);
+    verb->add_option("--calibration", options->calibration, "folder of `stagectl calibrate`");
+    verb->add_flag("--nominal", options->nominal, "no calibration: black level and gain as the stage states them");
+    verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
+        ->check(CLI::Range(1, 1'000'000));
+    verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();
+    verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
+    verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
+    verb->add_option("--production", options->slate.production, "slate: production");
+    verb->add_option("--scene", options->slate.scene, "slate: scene");
+    verb->add_option("--take", options->slate.take, "slate: take");
+    verb->add_option("--notes", options->slate.notes, "slate: notes");
+    verb->add_option("--timecode", options->slate.timecode_start, "timecode of the first target, HH:MM:SS:FF");
+    verb->add_flag("--json", options->json, "print the report as JSON");
+    verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
+}
+
+}  // namespace ols

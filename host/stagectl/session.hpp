@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// What the verbs that play share: the stage with its board and camera opened, a stop flag set by Ctrl-C, a progress bar.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <memory>
+#include <string>
+
+#include "device/board.hpp"
+#include "device/camera.hpp"
+#include "stage/stage.hpp"
+
+namespace ols {
+
+// --stage, --board and --camera.
+struct LinkOptions {
+    std::string stage_path, board, camera;
+
+    void add_to(CLI::App& verb, bool with_camera);
+};
+
+struct StageSession {
+    StageConfig stage;
+    std::unique_ptr<Board> board;
+    std::unique_ptr<Camera> camera;
+};
+
+// The default stage without --stage.
+Result<StageConfig> open_stage(const LinkOptions& options);
+
+// Options win over stage.toml. Errors say which of them is missing.
+Result<Board> open_board(const LinkOptions& options, const StageConfig& stage);
+Result<StageSession> open_session(const LinkOptions& options);
+
+// Turns true at the first SIGINT or SIGTERM; the second ends the program at once.
+const std::atomic<bool>& stop_on_signal();
+
+// Draws "label 42 %" on a terminal, nothing elsewhere; ends the line at the last.
+void show_progress(const char* label, uint64_t done, uint64_t total);
+
+// Runs a verb: prints its error and makes it exit code 1.
+template <typename F>
+int report_errors(F verb) {
+    const Result<int> exit_code = verb();
+    if (exit_code.ok()) return *exit_code;
+    std::fprintf(stderr, "stagectl: %s\n", exit_code.error().message.c_str());
+    return 1;
+}
+
+}  // namespace ols

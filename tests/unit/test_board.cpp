@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+// The board client against a scripted board that answers from protocol/frame.c, and against boards that misbehave.
+// links: ols_device
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+
+#include "device/board.hpp"
+#include "layout_hash.h"
+
+using namespace ols;
+
+namespace {
+
+using Bytes = std::vector<uint8_t>;
+
+template <typename T>
+Bytes bytes_of(const T& value) {
+    const auto* at = reinterpret_cast<const uint8_t*>(&value);
+    return Bytes(at, at + sizeof value);
+}
+
+struct Answer {
+    uint16_t type;
+    Bytes payload;
+};
+
+// Parses what the client sends and queues what `answer` says, handed out in pieces of `piece` bytes.
+class ScriptedBoard : public Transfer {
+  public:
+    using Script = std::function<Answer(uint16_t type, const Bytes& payload)>;
+    ScriptedBoard(Script script, size_t piece) : script_(std::move(script)), piece_(piece) {}
+
+    Status write(std::span<const uint8_t> bytes, uint32_t) override {
+        ols_frame_parser_write(&parser_, bytes.data(), bytes.size());
+        ols_frame frame;
+        while (ols_frame_parser_read(&parser_, &frame)) {
+            const Bytes payload(frame.payload, frame.payload + frame.payload_bytes);
+            const Answer answer = script_(frame.type, payload);
+            uint8_t reply[OLS_FRAME_BYTES_MAX];
+            const size_t n = ols_frame_encode(answer.type, frame.request_id, answer.payload.data(),
+                                              answer.payload.size(), reply, sizeof reply);
+            out_.insert(out_.end(), reply, reply + n);
+        }
+        return Done{};
+    }
+    Result<Bytes> read(size_t capacity, uint32_t) override {
+        if (out_.empty()) return fail("the board did not answer in time");
+        const size_t n = std::min({capacity, piece_, out_.size()});
+        Bytes piece(out_.begin(), out_.begin() + ptrdiff_t(n));
+        out_.erase(out_.begin(), out_.begin() + ptrdiff_t(n));
+        return piece;
+    }
+    Bytes out_;
+
+  private:
+    Script script_;
+    size_t piece_;
+    ols_frame_parser parser_{};
+};
+
+ols_hello_reply hello_reply() {
+    ols_hello_reply reply{};
+    reply.layout_hash = OLS_LAYOUT_HASH;
+    std::strcpy(reply.firmware_version, "1.2.3");
+    for (uint8_t i = 0; i < 8; ++i) reply.board_id[i] = uint8_t(0x10 + i);
+    reply.tick_hz = 125'000'000;
+    reply.chain_bits = 176;
+    return reply;
+}
+
+Result<Board> connect(ScriptedBoard::Script script, size_t piece = 64) {
+    return Board::connect(std::make_unique<ScriptedBoard>(
+        [script](uint16_t type, const Bytes& payload) {
+            if (type == OLS_HELLO) return Answer{OLS_HELLO | OLS_REPLY, bytes_of(hello_reply())};
+            return script(type, payload);
+        },
+        piece));
+}
+
+}  // namespace
+
+TEST(Board, hello_is_understood_however_the_stream_is_cut) {
+    for (const size_t piece : {1, 7, 64, 4096}) {
+        const auto board = connect({}, piece);
+        ASSERT_TRUE(board.ok()) << board.error().message;
+        EXPECT_STREQ(board->info().firmware_version, "1.2.3");
+        EXPECT_EQ(board->id(), "1011121314151617");
+    }
+}
+
+TEST(Board, another_message_layout_is_refused_with_a_remedy_even_when_the_reply_is_shorter) {
+    const auto board = Board::connect(std::make_unique<ScriptedBoard>(
+        [](uint16_t, const Bytes&) {
+            return Answer{OLS_HELLO | OLS_REPLY, bytes_of(uint64_t(0x123456789abcdef0))};
+        },
+        64));
+    ASSERT_FALSE(board.ok());
+    EXPECT_NE(board.error().message.find("123456789abcdef0"), std::string::npos);
+    EXPECT_NE(board.error().message.find("make flash"), std::string::npos);
+}
+
+TEST(Board, a_program_arrives_whole_in_chunks_with_its_crc) {
+    Bytes program(5000);
+    for (size_t i = 0; i < program.size(); ++i) program[i] = uint8_t(i * 7 + i / 251);
+    Bytes received;
+    ols_load_begin begin{};
+    bool ended = false;
+    auto board = connect([&](uint16_t type, const Bytes& payload) {
+        if (type == OLS_LOAD_BEGIN) std::memcpy(&begin, payload.data(), sizeof begin);
+        if (type == OLS_LOAD_CHUNK) {
+            ols_load_chunk chunk;
+            std::memcpy(&chunk, payload.data(), sizeof chunk);
+            EXPECT_EQ(chunk.offset_bytes, received.size());
+            received.insert(received.end(), payload.begin() + sizeof chunk, payload.end());
+        }
+        ended = type == OLS_LOAD_END;
+        return Answer{uint16_t(type | OLS_REPLY), {}};
+    });
+    ASSERT_TRUE(board->load(program, 125, 176, 3).ok());
+    EXPECT_TRUE(ended);
+    EXPECT_EQ(received, program);
+    EXPECT_EQ(begin.slot_count, 125);
+    EXPECT_EQ(begin.chain_bits, 176);
+    EXPECT_EQ(begin.cycles, 3u);
+    EXPECT_EQ(begin.program_bytes, 5000u);
+    // CRC-32 bit by bit, as the polynomial defines it.
+    uint32_t crc = ~0u;
+    for (const uint8_t byte : program) {
+        crc ^= byte;
+        for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xedb88320u : crc >> 1;
+    }
+    EXPECT_EQ(begin.program_crc32, ~crc);
+}
+
+TEST(Board, a_refusal_carries_the_boards_own_words_and_slot) {
+    ols_error_reply refusal{OLS_ERROR_BAD_PROGRAM, 17, "the gap is too short: shorten the exposure"};
+    auto board = connect([&](uint16_t, const Bytes&) { return Answer{OLS_ERROR | OLS_REPLY, bytes_of(refusal)}; });
+    const Status status = board->arm();
+    ASSERT_FALSE(status.ok());
+    EXPECT_NE(status.error().message.find("the gap is too short"), std::string::npos);
+    EXPECT_NE(status.error().message.find("slot 17"), std::string::npos);
+}
+
+TEST(Board, the_trigger_log_is_read_entry_by_entry) {
+    auto board = connect([](uint16_t, const Bytes& payload) {
+        ols_read_trigger_log what;
+        std::memcpy(&what, payload.data(), sizeof what);
+        Bytes reply = bytes_of(ols_trigger_log_reply{what.first_counter, what.first_counter + 40, 5, 3, 0});
+        for (uint32_t i = 0; i < 3; ++i) {
+            const Bytes entry = bytes_of(ols_trigger_log_entry{1000ull * i, what.first_counter + i, 2, uint16_t(i), 1});
+            reply.insert(reply.end(), entry.begin(), entry.end());
+        }
+        return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};
+    });
+    const auto log = board->read_trigger_log(7);
+    ASSERT_TRUE(log.ok()) << log.error().message;
+    EXPECT_EQ(log->next_counter, 47u);
+    EXPECT_EQ(log->entries_lost, 5u);
+    ASSERT_EQ(log->entries.size(), 3u);
+    EXPECT_EQ(uint32_t(log->entries[2].counter), 9u);
+    EXPECT_EQ(uint64_t(log->entries[2].rise_ticks), 2000u);
+}
+
+TEST(Board, a_trigger_log_whose_length_lies_is_an_error) {
+    auto board = connect([](uint16_t, const Bytes&) {
+        return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, bytes_of(ols_trigger_log_reply{0, 9, 0, 9, 0})};
+    });
+    EXPECT_FALSE(board->read_trigger_log(0).ok());
+}
+
+TEST(Board, a_reply_to_an_earlier_request_and_noise_are_passed_over) {
+    auto scripted = std::make_unique<ScriptedBoard>(
+        [](uint16_t type, const Bytes&) {
+            return type == OLS_HELLO ? Answer{OLS_HELLO | OLS_REPLY, bytes_of(hello_reply())}
+                                     : Answer{uint16_t(type | OLS_REPLY), {}};
+        },
+        64);
+    ScriptedBoard* stream = scripted.get();
+    auto board = Board::connect(std::move(scripted));
+    ASSERT_TRUE(board.ok());
+    uint8_t stale[64];
+    const size_t n = ols_frame_encode(OLS_ERROR | OLS_REPLY, 999, nullptr, 0, stale, sizeof stale);
+    stream->out_.assign(stale, stale + n);
+    stream->out_.insert(stream->out_.end(), {0x4c, 0x53, 0xff, 0x00});
+    EXPECT_TRUE(board->arm().ok());
+}
+
+TEST(Board, a_silent_or_missing_board_is_an_error) {
+    auto board = connect([](uint16_t, const Bytes&) { return Answer{0x1234, {}}; });
+    EXPECT_FALSE(board->status().ok());
+    EXPECT_NE(open_transfer("socket:/nonexistent.sock").error().message.find("start the stage"), std::string::npos);
+    EXPECT_NE(open_transfer("usb").error().message.find("socket:PATH"), std::string::npos);
+}
