@@ -145,8 +145,12 @@ Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
 }
 
 Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
-    const ols_load_begin begin{slot_count, chain_bits, cycles, uint32_t(program.size()),
-                               ols_crc32(0, program.data(), program.size())};
+    ols_load_begin begin{};
+    begin.slot_count = slot_count;
+    begin.chain_bits = chain_bits;
+    begin.cycles = cycles;
+    begin.program_bytes = uint32_t(program.size());
+    begin.program_crc32 = ols_crc32(0, program.data(), program.size());
     if (const auto reply = request(OLS_LOAD_BEGIN, bytes_of(begin)); !reply.ok()) return reply.error();
     constexpr size_t data_bytes_max = OLS_PAYLOAD_BYTES_MAX - sizeof(ols_load_chunk);
     for (size_t offset = 0; offset < program.size(); offset += data_bytes_max) {
