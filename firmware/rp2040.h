@@ -156,6 +156,7 @@ enum {
 #define DMA_CHAN_ABORT REGISTER(0x50000444)
 #define DMA_CTRL_CHAIN_TO(channel) ((uint32_t)(channel) << 11)
 #define DMA_CTRL_PACE(request) ((uint32_t)(request) << 15)
+#define DMA_CTRL_READ_RING(bits) ((uint32_t)(bits) << 6)
 #define DMA_CTRL_WRITE_RING(bits) (1u << 10 | (uint32_t)(bits) << 6)
 enum {
     DMA_CTRL_ENABLE = 1 << 0,

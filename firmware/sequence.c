@@ -16,6 +16,35 @@
 #include "text.h"
 
 enum { CYCLE_END_TICKS = EVENTS_TICKS_MIN, KINDS_ALL = (1 << (OLS_DARK + 1)) - 1 };
+enum { SLOTS_A_STEP = 32 };
+_Static_assert((int)TIMELINE_ENTER_TICKS == (int)CYCLE_END_TICKS, "a program may begin where another would go on");
+
+const struct ols_slot* sequence_slots(const struct sequence* sequence) {
+    return (const struct ols_slot*)sequence->words;
+}
+
+const uint32_t* sequence_patterns(const struct sequence* sequence) {
+    return sequence->words + sequence->header.slot_count * sizeof(struct ols_slot) / 4;
+}
+
+uint32_t sequence_patterns_words(const struct sequence* sequence) {
+    return sequence->header.slot_count * (uint32_t)sequence->pattern_words;
+}
+
+const uint32_t* sequence_enter(const struct sequence* sequence) {
+    return sequence->words + sequence->header.program_bytes / 4;
+}
+
+uint32_t sequence_triggers(const struct sequence* sequence, const struct ols_slot* slot) {
+    uint32_t fires = 0;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++)
+        if (!(sequence->header.triggers[n].skip_kinds >> slot->kind & 1)) fires |= slot->trigger_mask & 1u << n;
+    return fires;
+}
+
+int32_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n) {
+    return slot->trigger_offset_ticks + sequence->header.triggers[n].offset_ticks;
+}
 
 uint16_t sequence_pattern_words(uint16_t chain_bits) {
     return (uint16_t)((chain_bits + 31) / 32);
@@ -54,10 +83,6 @@ static bool pattern_is_empty_from(const uint32_t* words, uint16_t word_count, ui
         if (words[word] << before) return false;
     }
     return true;
-}
-
-static bool fires(const struct ols_trigger* trigger, unsigned n, const struct ols_slot* slot) {
-    return slot->trigger_mask >> n & 1 && !(trigger->skip_kinds >> slot->kind & 1);
 }
 
 static uint32_t lit_ticks_of(const struct ols_slot* slot) {
@@ -112,79 +137,16 @@ static bool check_header(const struct sequence_board* board, const struct ols_lo
                       " bits: compile the program for that");
     if (header->slot_count < 1 || header->slot_count > OLS_SLOTS_MAX)
         return reject(error, OLS_NO_SLOT, "a program has 1 to ", OLS_SLOTS_MAX, " slots");
-    const uint32_t pattern_words = sequence_pattern_words(board->chain_bits);
-    if (header->slot_count * pattern_words > SEQUENCE_PATTERN_WORDS_MAX)
-        return reject(error, OLS_NO_SLOT, "this chain leaves room for ", SEQUENCE_PATTERN_WORDS_MAX / pattern_words,
-                      " slots: send fewer");
-    const uint32_t program_bytes = header->slot_count * (sizeof(struct ols_slot) + 4 * pattern_words);
+    if (header->cycles > OLS_CYCLES_MAX)
+        return reject(error, OLS_NO_SLOT, "a program counts ", OLS_CYCLES_MAX, " cycles at most: send 0 for endless");
+    const uint32_t pattern_bytes = 4u * sequence_pattern_words(board->chain_bits);
+    const uint32_t program_bytes = header->slot_count * (sizeof(struct ols_slot) + pattern_bytes);
     if (header->program_bytes != program_bytes)
         return reject(error, OLS_NO_SLOT, "a program of so many slots has ", program_bytes, " bytes");
-    return true;
-}
-
-// The pulses of each trigger, in order.
-struct schedule {
-    const struct ols_load_begin* header;
-    const uint8_t* program;
-    size_t slot_bytes;
-    struct {
-        uint32_t next_slot;
-        uint64_t light_ticks;     // of next_slot, since the cycle's begin
-        uint64_t earliest_ticks;  // at which the next pulse may rise
-    } triggers[OLS_TRIGGERS];
-    bool good;
-    struct ols_error_reply* error;
-};
-
-static struct ols_slot slot_at(const struct schedule* schedule, uint32_t n) {
-    struct ols_slot slot;
-    memcpy(&slot, schedule->program + n * schedule->slot_bytes, sizeof slot);
-    return slot;
-}
-
-static void place_pulse(struct schedule* schedule, unsigned n, const struct ols_slot* slot, uint16_t number,
-                        struct events_pulse* pulse) {
-    const struct ols_trigger* const trigger = &schedule->header->triggers[n];
-    const int64_t rise_ticks =
-        (int64_t)schedule->triggers[n].light_ticks + slot->trigger_offset_ticks + trigger->offset_ticks;
-    const uint32_t width_ticks = trigger->width_ticks ? trigger->width_ticks : slot->exposure_ticks;
-    if (rise_ticks < 0)
-        schedule->good = reject(schedule->error, number, "a trigger begins before the cycle: raise lead_ticks by ",
-                                (uint32_t)-rise_ticks, " or more");
-    else if ((uint64_t)rise_ticks < schedule->triggers[n].earliest_ticks)
-        schedule->good = reject(schedule->error, number, "its pulse overlaps an earlier one of trigger ", n, "");
-    if (!schedule->good) return;
-    *pulse = (struct events_pulse){(uint64_t)rise_ticks, (uint64_t)rise_ticks + width_ticks, number};
-    schedule->triggers[n].earliest_ticks = pulse->fall_ticks + EVENTS_TICKS_MIN;
-}
-
-static void next_pulse(void* context, unsigned n, struct events_pulse* pulse) {
-    struct schedule* const schedule = context;
-    *pulse = (struct events_pulse){EVENTS_NEVER, EVENTS_NEVER, 0};
-    bool found = false;
-    while (!found && schedule->triggers[n].next_slot < schedule->header->slot_count) {
-        const uint16_t number = (uint16_t)schedule->triggers[n].next_slot++;
-        const struct ols_slot slot = slot_at(schedule, number);
-        found = fires(&schedule->header->triggers[n], n, &slot);
-        if (found) place_pulse(schedule, n, &slot, number, pulse);
-        schedule->triggers[n].light_ticks += slot.period_ticks;
-    }
-}
-
-// Stretches of the light. What the last slot's dark ends with is the lead of the next cycle and the cycle's end.
-static void play_slot(struct events* events, const struct sequence_board* board, const struct ols_load_begin* header,
-                      const struct ols_slot* slot, uint16_t number) {
-    const uint32_t sync_pin = number == 0 ? PIN_SYNC : 0;
-    const uint32_t light_pin = slot->kind == OLS_DARK ? 0 : PIN_LIGHT_EN;
-    const uint32_t lit_ticks = lit_ticks_of(slot);
-    const uint32_t sending_ticks = busy_ticks(board, slot) - lit_ticks;
-    uint32_t rest_ticks = slot->period_ticks - SEQUENCE_LATCH_TICKS - lit_ticks - sending_ticks;
-    if (number + 1 == header->slot_count) rest_ticks -= header->lead_ticks + CYCLE_END_TICKS;
-
-    events_play(events, sync_pin | PIN_LATCH, TIMELINE_HOLD, SEQUENCE_LATCH_TICKS);
-    events_play(events, sync_pin | light_pin, TIMELINE_SHIFT, lit_ticks);
-    if (sending_ticks > 0) events_play(events, sync_pin, TIMELINE_HOLD, sending_ticks);
-    events_play(events, sync_pin, TIMELINE_SYNC, rest_ticks);
+    if (program_bytes / 4 >= SEQUENCE_WORDS_MAX)
+        return reject(error, OLS_NO_SLOT, "the program is longer than the board's ", 4 * SEQUENCE_WORDS_MAX,
+                      " bytes: send fewer slots");
+    return check_triggers(header, error);
 }
 
 // The lead comes from the end of the last slot, where nothing but waiting is left.
@@ -199,65 +161,124 @@ static bool check_lead(const struct sequence_board* board, const struct ols_load
     return true;
 }
 
-static bool reject_events(const struct events* events, uint16_t number, struct ols_error_reply* error) {
-    if (events->problem == EVENTS_TOO_MANY)
-        return reject(error, number, "this program needs more than the board's ", SEQUENCE_EVENTS_MAX,
-                      " events: send fewer slots");
-    return reject(error, events->last_slot, "an edge of a trigger must coincide with any other edge or be ",
-                  EVENTS_TICKS_MIN, " ticks away");
-}
-
-static bool play_cycle(const struct sequence_board* board, struct schedule* schedule, struct sequence* sequence) {
-    const struct ols_load_begin* const header = schedule->header;
-    struct events events;
-    events_begin(&events, sequence->events, SEQUENCE_EVENTS_MAX, next_pulse, schedule);
-    if (header->lead_ticks > 0) events_play(&events, 0, TIMELINE_HOLD, header->lead_ticks);
-    for (uint16_t n = 0; n < header->slot_count && schedule->good; n++) {
-        const struct ols_slot slot = slot_at(schedule, n);
-        play_slot(&events, board, header, &slot, n);
-        if (events.problem != EVENTS_FINE) return reject_events(&events, n, schedule->error);
+static void place_pulse(struct sequence_compiler* compiler, unsigned n, uint16_t number, struct events_pulse* pulse) {
+    const struct sequence* const sequence = compiler->sequence;
+    const struct ols_slot* const slot = &sequence_slots(sequence)[number];
+    struct sequence_trigger_place* const place = &compiler->triggers[n];
+    const int64_t rise_ticks = (int64_t)place->light_ticks + sequence_trigger_offset_ticks(sequence, slot, n);
+    const uint32_t width_ticks = sequence->header.triggers[n].width_ticks;
+    if (rise_ticks < 0) {
+        compiler->refused = !reject(compiler->error, number, "a trigger begins before the cycle: raise lead_ticks by ",
+                                    (uint32_t)-rise_ticks, " or more");
+    } else if ((uint64_t)rise_ticks < place->earliest_ticks) {
+        compiler->refused = !reject(compiler->error, number, "its pulse overlaps an earlier one of trigger ", n, "");
+    } else {
+        const uint64_t rise = (uint64_t)rise_ticks;
+        *pulse = (struct events_pulse){rise, rise + (width_ticks ? width_ticks : slot->exposure_ticks), number};
+        place->earliest_ticks = pulse->fall_ticks + EVENTS_TICKS_MIN;
     }
-    for (unsigned n = 0; n < OLS_TRIGGERS && schedule->good; n++)
-        if (events.pulses[n].fall_ticks > events.now_ticks && events.pulses[n].fall_ticks != EVENTS_NEVER)
-            schedule->good = reject(schedule->error, events.pulses[n].slot, "its pulse of trigger ", n,
-                                    " ends after the cycle: end the cycle with a longer slot");
-    // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
-    const bool endless = header->cycles == 0;
-    events_play(&events, 0, endless ? TIMELINE_HOLD : TIMELINE_CYCLE_END, CYCLE_END_TICKS);
-    sequence->event_count = events.word_count;
-    return schedule->good;
 }
 
-bool sequence_compile(const struct sequence_board* board, const struct ols_load_begin* header, const uint8_t* program,
-                      struct sequence* sequence, struct ols_error_reply* error) {
-    sequence->slot_count = 0;
-    sequence->event_count = 0;
-    if (!check_header(board, header, error) || !check_triggers(header, error)) return false;
-    sequence->cycles = header->cycles;
+static void next_pulse(void* context, unsigned n, struct events_pulse* pulse) {
+    struct sequence_compiler* const compiler = context;
+    const struct sequence* const sequence = compiler->sequence;
+    struct sequence_trigger_place* const place = &compiler->triggers[n];
+    *pulse = (struct events_pulse){EVENTS_NEVER, EVENTS_NEVER, 0};
+    for (bool found = false; !found && place->next_slot < sequence->header.slot_count; place->next_slot++) {
+        const struct ols_slot* const slot = &sequence_slots(sequence)[place->next_slot];
+        found = sequence_triggers(sequence, slot) >> n & 1;
+        if (found) place_pulse(compiler, n, (uint16_t)place->next_slot, pulse);
+        place->light_ticks += slot->period_ticks;
+    }
+}
+
+// Stretches of the light. What the last slot's dark ends with is the lead of the next cycle and the cycle's end.
+static void play_slot(struct sequence_compiler* compiler, const struct ols_slot* slot, uint32_t number) {
+    struct events* const events = &compiler->events;
+    const struct ols_load_begin* const header = &compiler->sequence->header;
+    const uint32_t sync_pin = number == 0 ? PIN_SYNC : 0;
+    const uint32_t light_pin = slot->kind == OLS_DARK ? 0 : PIN_LIGHT_EN;
+    const uint32_t lit_ticks = lit_ticks_of(slot);
+    const uint32_t sending_ticks = busy_ticks(compiler->board, slot) - lit_ticks;
+    uint32_t rest_ticks = slot->period_ticks - SEQUENCE_LATCH_TICKS - lit_ticks - sending_ticks;
+    if (number + 1 == header->slot_count) rest_ticks -= header->lead_ticks + CYCLE_END_TICKS;
+
+    events_play(events, sync_pin | PIN_LATCH, TIMELINE_HOLD, SEQUENCE_LATCH_TICKS);
+    events_play(events, sync_pin | light_pin, TIMELINE_SHIFT, lit_ticks);
+    if (sending_ticks > 0) events_play(events, sync_pin, TIMELINE_HOLD, sending_ticks);
+    events_play(events, sync_pin, TIMELINE_SYNC, rest_ticks);
+}
+
+static bool events_are_fine(struct sequence_compiler* compiler, uint16_t number) {
+    const struct events* const events = &compiler->events;
+    switch (events->problem) {
+        case EVENTS_TOO_MANY:
+            return reject(compiler->error, number, "program and events need more than the board's ",
+                          4 * SEQUENCE_WORDS_MAX, " bytes: send fewer slots");
+        case EVENTS_TOO_CLOSE:
+            return reject(compiler->error, events->last_slot,
+                          "an edge of a trigger must coincide with any other edge or be ", EVENTS_TICKS_MIN,
+                          " ticks away");
+        default: return true;
+    }
+}
+
+void sequence_begin(struct sequence_compiler* compiler, const struct sequence_board* board, struct sequence* sequence) {
+    *compiler = (struct sequence_compiler){.board = board, .sequence = sequence};
     sequence->pattern_words = sequence_pattern_words(board->chain_bits);
-    const uint32_t pattern_bytes = sequence->pattern_words * 4u;
-    struct schedule schedule = {.header = header,
-                                .program = program,
-                                .slot_bytes = sizeof(struct ols_slot) + pattern_bytes,
-                                .good = true,
-                                .error = error};
+    sequence->cycle_words = 0;
+}
+
+// Everything about the cycle as a whole; then its lead.
+static bool begin_cycle(struct sequence_compiler* compiler) {
+    struct sequence* const sequence = compiler->sequence;
+    const struct ols_load_begin* const header = &sequence->header;
+    if (!check_header(compiler->board, header, compiler->error)) return false;
+    // The last slot first: the lead is a part of it.
+    const uint16_t last = (uint16_t)(header->slot_count - 1);
+    const struct ols_slot* const slot = &sequence_slots(sequence)[last];
+    const uint32_t* const pattern = sequence_patterns(sequence) + last * (uint32_t)sequence->pattern_words;
+    if (!check_slot(compiler->board, slot, pattern, last, compiler->error)) return false;
+    if (!check_lead(compiler->board, header, slot, compiler->error)) return false;
+
+    uint32_t* const enter = sequence->words + header->program_bytes / 4;
+    *enter = TIMELINE_ENTER << 8 | (header->cycles - 1) << 13;
     for (unsigned n = 0; n < OLS_TRIGGERS; n++)
-        schedule.triggers[n].light_ticks = (uint64_t)header->lead_ticks + SEQUENCE_LATCH_TICKS;
-    struct ols_slot slot;
-    sequence->inverted_triggers = 0;
-    for (uint16_t n = 0; n < header->slot_count; n++) {
-        slot = slot_at(&schedule, n);
-        // The chain starts with slot 0's pattern in it; what slot n sends is its successor's.
-        uint32_t* const pattern = sequence->patterns + n * sequence->pattern_words;
-        memcpy(pattern, program + n * schedule.slot_bytes + sizeof slot, pattern_bytes);
-        if (!check_slot(board, &slot, pattern, n, error)) return false;
-        sequence->slots[n] =
-            (struct sequence_slot){slot.period_ticks, slot.trigger_offset_ticks + header->triggers[0].offset_ticks, 0};
-        for (unsigned t = 0; t < OLS_TRIGGERS; t++)
-            if (fires(&header->triggers[t], t, &slot)) sequence->slots[n].trigger_mask |= 1u << t;
-    }
-    for (unsigned n = 0; n < OLS_TRIGGERS; n++) sequence->inverted_triggers |= header->triggers[n].active_low << n;
-    if (!check_lead(board, header, &slot, error) || !play_cycle(board, &schedule, sequence)) return false;
-    sequence->slot_count = header->slot_count;
-    return true;
+        compiler->triggers[n].light_ticks = (uint64_t)header->lead_ticks + SEQUENCE_LATCH_TICKS;
+    const uint32_t words_max = SEQUENCE_WORDS_MAX - header->program_bytes / 4 - 1;
+    events_begin(&compiler->events, enter + 1, words_max, next_pulse, compiler);
+    if (header->lead_ticks > 0) events_play(&compiler->events, 0, TIMELINE_HOLD, header->lead_ticks);
+    return !compiler->refused;
+}
+
+static bool end_cycle(struct sequence_compiler* compiler) {
+    struct events* const events = &compiler->events;
+    const struct ols_load_begin* const header = &compiler->sequence->header;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++)
+        if (events->pulses[n].fall_ticks > events->now_ticks && events->pulses[n].fall_ticks != EVENTS_NEVER)
+            return reject(compiler->error, events->pulses[n].slot, "its pulse of trigger ", n,
+                          " ends after the cycle: end the cycle with a longer slot");
+    // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
+    events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, CYCLE_END_TICKS);
+    compiler->sequence->cycle_words = events->word_count;
+    return events_are_fine(compiler, (uint16_t)(header->slot_count - 1));
+}
+
+static bool add_slot(struct sequence_compiler* compiler) {
+    const struct sequence* const sequence = compiler->sequence;
+    const uint16_t number = (uint16_t)compiler->next_slot++;
+    const struct ols_slot* const slot = &sequence_slots(sequence)[number];
+    const uint32_t* const pattern = sequence_patterns(sequence) + number * (uint32_t)sequence->pattern_words;
+    if (!check_slot(compiler->board, slot, pattern, number, compiler->error)) return false;
+    play_slot(compiler, slot, number);
+    return !compiler->refused && events_are_fine(compiler, number);
+}
+
+enum sequence_progress sequence_step(struct sequence_compiler* compiler, struct ols_error_reply* error) {
+    compiler->error = error;
+    if (compiler->next_slot == 0 && !begin_cycle(compiler)) return SEQUENCE_REFUSED;
+    for (int n = 0; n < SLOTS_A_STEP && compiler->next_slot < compiler->sequence->header.slot_count; n++)
+        if (!add_slot(compiler)) return SEQUENCE_REFUSED;
+    if (compiler->next_slot < compiler->sequence->header.slot_count) return SEQUENCE_UNFINISHED;
+    return end_cycle(compiler) ? SEQUENCE_MADE : SEQUENCE_REFUSED;
 }

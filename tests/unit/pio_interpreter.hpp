@@ -109,6 +109,7 @@ struct PioMachine {
         switch (destination) {
             case 0: set_pins(out_pin, out_count, value); break;
             case 1: x = value; break;
+            case 2: y = value; break;
             case 5: next = int(value); break;
             default: throw std::runtime_error("destination unknown to this interpreter");
         }

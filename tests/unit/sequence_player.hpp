@@ -31,16 +31,15 @@ struct Program {
     ols_trigger triggers[OLS_TRIGGERS]{};
     std::vector<Slot> slots;
 
+    // As loaded: the slots, then their patterns.
     std::vector<uint8_t> bytes() const {
         std::vector<uint8_t> all;
         const auto append = [&](const void* from, size_t count) {
             const auto* first = static_cast<const uint8_t*>(from);
             all.insert(all.end(), first, first + count);
         };
-        for (const Slot& slot : slots) {
-            append(&slot.header, sizeof slot.header);
-            append(slot.pattern.data(), slot.pattern.size() * 4);
-        }
+        for (const Slot& slot : slots) append(&slot.header, sizeof slot.header);
+        for (const Slot& slot : slots) append(slot.pattern.data(), slot.pattern.size() * 4);
         return all;
     }
 };
@@ -49,19 +48,27 @@ struct Compiled {
     bool ok = false;
     std::unique_ptr<sequence> words = std::make_unique<sequence>();
     ols_error_reply error{};
+
+    uint32_t word_count() const { return words->header.program_bytes / 4 + 1 + words->cycle_words; }
 };
 
 inline Compiled compile(const Program& program) {
     const std::vector<uint8_t> bytes = program.bytes();
-    ols_load_begin header{};
+    Compiled result;
+    ols_load_begin& header = result.words->header;
     header.slot_count = uint16_t(program.slots.size());
     header.chain_bits = program.board.chain_bits;
     header.cycles = program.cycles;
     header.program_bytes = uint32_t(bytes.size());
     header.lead_ticks = program.lead_ticks;
     std::copy(std::begin(program.triggers), std::end(program.triggers), header.triggers);
-    Compiled result;
-    result.ok = sequence_compile(&program.board, &header, bytes.data(), result.words.get(), &result.error);
+    if (bytes.size() <= sizeof result.words->words) std::memcpy(result.words->words, bytes.data(), bytes.size());
+    sequence_compiler compiler;
+    sequence_begin(&compiler, &program.board, result.words.get());
+    sequence_progress progress;
+    do progress = sequence_step(&compiler, &result.error);
+    while (progress == SEQUENCE_UNFINISHED);
+    result.ok = progress == SEQUENCE_MADE;
     return result;
 }
 
@@ -149,15 +156,15 @@ struct Stage {
         timeline.out_count = 8;
         timeline.shift_right = true;
         timeline.pc = TIMELINE_NEXT;
-        timeline.table.assign(words.events, words.events + words.event_count);
-        timeline.y = words.cycles - 1;
+        timeline.table.assign(sequence_enter(&words) + 1, sequence_enter(&words) + 1 + words.cycle_words);
+        timeline.y = words.header.cycles - 1;
         shifter.side_bits = 1;
         shifter.side_pin = CLK;
         shifter.out_pin = DATA;
         shifter.out_count = 1;
         shifter.status_below = words.pattern_words;
         shifter.isr = program.board.chain_bits - 1u;
-        shifter.table.assign(words.patterns, words.patterns + words.slot_count * words.pattern_words);
+        shifter.table.assign(sequence_patterns(&words), sequence_patterns(&words) + sequence_patterns_words(&words));
     }
 
     void tick() {

@@ -67,9 +67,10 @@ class Link : public testing::Test {
             slot.period_ticks = period_ticks;
             const Bytes header = bytes_of(slot);
             all.insert(all.end(), header.begin(), header.end());
+        }
+        for (int n = 0; n < slots; n++)
             for (int word = 0; word < 6; word++)
                 for (int byte = 0; byte < 4; byte++) all.push_back(word < 5 ? uint8_t(37 * n + word) : 0);
-        }
         return all;
     }
 
@@ -193,12 +194,81 @@ TEST_F(Link, commands_out_of_order_are_refused_and_change_nothing) {
     EXPECT_EQ(ask(OLS_START).error(), OLS_ERROR_BAD_STATE);
     ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
     EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
-    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     const Reply refused = ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1)));
     EXPECT_EQ(refused.error(), OLS_ERROR_BAD_STATE);
-    EXPECT_NE(refused.text().find("stop it before loading"), std::string::npos);
+    EXPECT_NE(refused.text().find("before loading"), std::string::npos);
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE);
     board_host_run_us(30'000);
     EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, the_next_program_is_loaded_while_one_plays_and_follows_at_the_end_of_a_cycle) {
+    play(0);
+    board_host_run_us(5'000);
+    ASSERT_TRUE(load(program(7, 60'000), 2).ok(OLS_LOAD_END));
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+    EXPECT_EQ(status().next, OLS_NEXT_READY);
+    const Reply reply = ask(OLS_SWAP);
+    ASSERT_TRUE(reply.ok(OLS_SWAP)) << reply.text();
+    const auto swap = reply.as<ols_swap_reply>();
+    EXPECT_EQ(swap.after_cycles, 2u);
+    EXPECT_EQ(swap.program, 1);
+    EXPECT_EQ(status().next, OLS_NEXT_SWAPPING);
+    EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_BAD_STATE);
+    board_host_run_us(50'000);
+    const ols_status_reply done = status();
+    EXPECT_EQ(done.state, OLS_STATE_DONE);
+    EXPECT_EQ(done.fault, OLS_FAULT_NONE);
+    EXPECT_EQ(done.next, OLS_NEXT_NONE);
+    EXPECT_EQ(done.triggers_fired, 2u * 18 + 2 * 7);
+    EXPECT_EQ(done.cycles_played, 2u);
+    EXPECT_EQ(done.program_crc32, begin_for(program(7, 60'000), 2).program_crc32);
+    const Reply log = ask(OLS_READ_TRIGGER_LOG, bytes_of(ols_read_trigger_log{35, 2, 0}));
+    ols_trigger_log_entry entries[2];
+    memcpy(entries, log.payload.data() + sizeof(ols_trigger_log_reply), sizeof entries);
+    EXPECT_EQ(entries[1].rise_ticks - entries[0].rise_ticks, 57'870u) << "no slot is late";
+    EXPECT_EQ(entries[0].program, 0);
+    EXPECT_EQ(entries[1].program, 1);
+    EXPECT_EQ(entries[1].slot, 0);
+}
+
+TEST_F(Link, a_bad_next_program_leaves_the_playing_one_alone) {
+    play(0);
+    Bytes impossible = program(18);
+    impossible[8] = impossible[9] = impossible[10] = 0;
+    EXPECT_EQ(load(impossible).error(), OLS_ERROR_BAD_PROGRAM);
+    EXPECT_EQ(status().next, OLS_NEXT_NONE);
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE);
+    board_host_run_us(30'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, a_next_program_that_was_not_swapped_in_is_the_one_that_arm_plays) {
+    play(1);
+    ASSERT_TRUE(load(program(5), 1).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE) << "one cycle is over before any swap";
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().triggers_fired, 18u);
+    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().triggers_fired, 5u);
+}
+
+TEST_F(Link, programs_whose_cycles_begin_otherwise_cannot_be_swapped) {
+    play(0);
+    ols_load_begin begin = begin_for(program(18), 0);
+    begin.lead_ticks = 500;
+    ASSERT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin)).ok(OLS_LOAD_BEGIN));
+    Bytes chunk = bytes_of(ols_load_chunk{0});
+    const Bytes data = program(18);
+    chunk.insert(chunk.end(), data.begin(), data.end());
+    ASSERT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
+    ASSERT_TRUE(ask(OLS_LOAD_END).ok(OLS_LOAD_END));
+    const Reply reply = ask(OLS_SWAP);
+    EXPECT_EQ(reply.error(), OLS_ERROR_BAD_PROGRAM);
+    EXPECT_NE(reply.text().find("lead_ticks"), std::string::npos);
 }
 
 TEST_F(Link, a_damaged_program_is_refused_and_gone) {
@@ -216,7 +286,7 @@ TEST_F(Link, a_damaged_program_is_refused_and_gone) {
 
 TEST_F(Link, an_impossible_program_is_refused_with_its_slot) {
     Bytes impossible = program(18);
-    impossible[7 * 40 + 8] = impossible[7 * 40 + 9] = impossible[7 * 40 + 10] = 0;  // slot 7: period 0
+    impossible[7 * 16 + 8] = impossible[7 * 16 + 9] = impossible[7 * 16 + 10] = 0;  // slot 7: period 0
     const Reply reply = load(impossible);
     EXPECT_EQ(reply.error(), OLS_ERROR_BAD_PROGRAM);
     EXPECT_EQ(reply.as<ols_error_reply>().slot, 7);

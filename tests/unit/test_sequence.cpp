@@ -54,6 +54,52 @@ TEST(Sequence, an_endless_program_goes_on_without_a_gap) {
     expect_plays_program(stage, program);
 }
 
+// The words as the cycle feeds hand them over at a swap: the first program without its last word, then the second from
+// its entry on.
+TEST(Sequence, a_program_entered_at_the_end_of_anothers_cycle_plays_without_a_missing_or_late_slot) {
+    std::mt19937 random(22);
+    for (int repeat = 0; repeat < 20; repeat++) {
+        Program first = random_program(random, 33, 1 + int(random() % 5));
+        Program second = random_program(random, 33, 1 + int(random() % 5));
+        first.cycles = repeat % 3 ? 0 : 7;
+        second.cycles = 1 + random() % 3;
+        const uint32_t first_cycles = 1 + random() % 4;
+        const Compiled a = compile(first), b = compile(second);
+        ASSERT_TRUE(a.ok && b.ok);
+        Stage stage(first, *a.words);
+        const auto append = [](std::vector<uint32_t>& table, const uint32_t* words, uint32_t count, uint32_t times) {
+            for (; times > 0; times--) table.insert(table.end(), words, words + count);
+        };
+        std::vector<uint32_t>&timeline = stage.timeline.table, &shifter = stage.shifter.table;
+        timeline.clear();
+        append(timeline, sequence_enter(a.words.get()) + 1, a.words->cycle_words, first_cycles);
+        timeline.pop_back();
+        append(timeline, sequence_enter(b.words.get()), b.words->cycle_words + 1, 1);
+        append(timeline, sequence_enter(b.words.get()) + 1, b.words->cycle_words, second.cycles);
+        shifter.clear();
+        append(shifter, sequence_patterns(a.words.get()), sequence_patterns_words(a.words.get()), first_cycles);
+        append(shifter, sequence_patterns(b.words.get()), sequence_patterns_words(b.words.get()), second.cycles + 1);
+        stage.arm();
+        stage.run(1'000'000);
+        EXPECT_EQ(stage.block.flags & 7, 1u << 1) << "the second program has counted its own cycles";
+        // Both programs as one long one.
+        Program both = first;
+        both.cycles = 1;
+        both.slots.clear();
+        std::vector<size_t> begins;
+        for (uint32_t cycle = 0; cycle < first_cycles + second.cycles; cycle++) {
+            const std::vector<Slot>& slots = (cycle < first_cycles ? first : second).slots;
+            begins.push_back(both.slots.size());
+            both.slots.insert(both.slots.end(), slots.begin(), slots.end());
+        }
+        for (size_t n = 0; n < stage.played.size(); n++) {
+            EXPECT_EQ(stage.played[n].sync, std::count(begins.begin(), begins.end(), n) == 1) << "slot " << n;
+            stage.played[n].sync = n == 0;  // as in the long program
+        }
+        expect_plays_program(stage, both);
+    }
+}
+
 TEST(Sequence, a_one_slot_cycle_still_gives_sync_an_edge_each_cycle) {
     Program program;
     program.cycles = 3;
@@ -74,7 +120,7 @@ TEST(Sequence, a_starved_timeline_is_dark_from_the_tick_at_which_the_missing_eve
     std::mt19937 random(3);
     const Program program = random_program(random, 176, 8);
     const Compiled compiled = compile(program);
-    for (uint64_t words = 1; words < compiled.words->event_count; words++) {
+    for (uint64_t words = 1; words < compiled.words->cycle_words; words++) {
         Stage fed(program, *compiled.words), starved(program, *compiled.words);
         starved.timeline.words_fed = words;
         fed.arm();
@@ -96,7 +142,7 @@ TEST(Sequence, a_starved_shifter_never_lets_half_a_pattern_be_latched) {
     std::mt19937 random(4);
     const Program program = random_program(random, 176, 8);
     const Compiled compiled = compile(program);
-    const uint64_t all_words = compiled.words->slot_count * compiled.words->pattern_words;
+    const uint64_t all_words = sequence_patterns_words(compiled.words.get());
     for (uint64_t words = compiled.words->pattern_words; words < all_words; words++) {
         Stage stage(program, *compiled.words);
         stage.shifter.words_fed = words;
@@ -152,7 +198,6 @@ TEST(Sequence, what_cannot_be_played_is_refused_with_slot_and_reason) {
         EXPECT_FALSE(compiled.ok);
         EXPECT_EQ(compiled.error.code, OLS_ERROR_BAD_PROGRAM);
         EXPECT_NE(std::string(compiled.error.text).find(reason), std::string::npos) << compiled.error.text;
-        EXPECT_EQ(compiled.words->slot_count, 0);
         return compiled.error.slot;
     };
     EXPECT_EQ(refused([](Program& p) { p.slots[2].header.kind = 4; }, "unknown kind 4"), 2);
@@ -186,22 +231,19 @@ TEST(Sequence, what_cannot_be_played_is_refused_with_slot_and_reason) {
                       for (Slot& s : p.slots) s.header.period_ticks = 0xfffffff0;
                       p.slots.resize(1024, p.slots[0]);
                   },
-                  "events"),
-              15);
+                  "bytes"),
+              53);
 }
 
 TEST(Sequence, a_program_for_another_chain_is_refused) {
     Program program;
     program.slots = {slot(OLS_BASIS, 1000, 3000)};
-    const std::vector<uint8_t> bytes = program.bytes();
-    ols_load_begin header{};
-    header.slot_count = 1;
-    header.chain_bits = 160;
-    header.program_bytes = uint32_t(bytes.size());
-    sequence words;
-    ols_error_reply error{};
-    EXPECT_FALSE(sequence_compile(&program.board, &header, bytes.data(), &words, &error));
-    EXPECT_STREQ(error.text, "this board's chain has 176 bits: compile the program for that");
+    Compiled compiled = compile(program);
+    compiled.words->header.chain_bits = 160;
+    sequence_compiler compiler;
+    sequence_begin(&compiler, &program.board, compiled.words.get());
+    EXPECT_EQ(sequence_step(&compiler, &compiled.error), SEQUENCE_REFUSED);
+    EXPECT_STREQ(compiled.error.text, "this board's chain has 176 bits: compile the program for that");
 }
 
 TEST(Sequence, a_full_program_of_1024_slots_fits) {
@@ -209,8 +251,17 @@ TEST(Sequence, a_full_program_of_1024_slots_fits) {
     for (int n = 0; n < OLS_SLOTS_MAX; n++) program.slots.push_back(slot(OLS_BASIS, 51'500, 57'870));
     const Compiled compiled = compile(program);
     ASSERT_TRUE(compiled.ok) << compiled.error.text;
-    const size_t bytes = 4 * (compiled.words->event_count + compiled.words->slot_count * compiled.words->pattern_words);
-    EXPECT_EQ(bytes, 1024 * 36 + 4) << "36 bytes a slot, and the end of the cycle";
+    const uint32_t bytes = 4 * (compiled.words->cycle_words + sequence_patterns_words(compiled.words.get()));
+    EXPECT_EQ(bytes, 1024u * 36 + 4) << "36 bytes a slot, and the end of the cycle";
+}
+
+TEST(Sequence, a_full_program_with_four_triggers_of_their_own_fits) {
+    Program program;
+    for (int n = 0; n < OLS_SLOTS_MAX; n++) program.slots.push_back(slot(OLS_BASIS, 51'500, 57'870, 6, 15));
+    for (int n = 0; n < OLS_TRIGGERS; n++) program.triggers[n] = {100 * (n + 1), 1000u * (n + 1), 0, 0, 0};
+    const Compiled compiled = compile(program);
+    ASSERT_TRUE(compiled.ok) << compiled.error.text;
+    EXPECT_EQ(compiled.words->cycle_words, 1024u * (3 + 8) + 1);
 }
 
 TEST(Witness, counts_every_second_tick_in_every_path) {

@@ -121,7 +121,7 @@ class Link:
 
     def status(self):
         names = ("state", "fault", "fault_slot", "boot_nonce", "fault_ticks", "now_ticks", "triggers_fired",
-                 "cycles_played", "log_entries_lost", "program_crc32")
+                 "cycles_played", "log_entries_lost", "program_crc32", "next")
         return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
 
     def load(self, program, chunk_bytes=1000):
@@ -135,6 +135,10 @@ class Link:
         self.load(program)
         self.ask(wire.ARM)
         self.ask(wire.START)
+
+    def swap(self):
+        """Lets the loaded next program follow; returns after how many cycles, and its number."""
+        return wire.SWAP_REPLY.unpack(self.ask(wire.SWAP))
 
     def wait_until(self, states, polls=100_000):
         """Asks for the status until the board is in one of `states`; returns that status."""

@@ -5,18 +5,20 @@ import zlib
 
 SYNC = 0x534C
 REPLY = 0x80
-HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT = range(1, 11)
+HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT, SWAP = range(1, 12)
 ERROR = 0x7F
 
 BASIS, TRACKING, MATTE, DARK = range(4)
+NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
 IDLE, LOADED, ARMED, PLAYING, DONE, FAULT = range(6)
 FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED = 3, 5, 7
 
 HELLO_REPLY = struct.Struct("<Q24s8sIIIHHII")
-STATUS_REPLY = struct.Struct("<BBHIQQIIII")
+STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
+SWAP_REPLY = struct.Struct("<IB3x")
 LOG_REPLY = struct.Struct("<IIIHH")
-LOG_ENTRY = struct.Struct("<QIIHH")
+LOG_ENTRY = struct.Struct("<QIIHBB")
 ERROR_REPLY = struct.Struct("<HH116s")
 LOAD_BEGIN_REQUEST = struct.Struct("<HHIIII")
 TRIGGER = struct.Struct("<iIBBH")
@@ -62,11 +64,12 @@ def load_begin(program, data):
 
 
 def program_bytes(program):
-    """The slots of a program (see program.py) as they are loaded."""
+    """The slots of a program (see program.py) and then their patterns, as they are loaded."""
     out = bytearray()
     for slot in program["slots"]:
         out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"],
                          slot.get("trigger_offset_ticks", 0))
+    for slot in program["slots"]:
         words = pattern_words(slot["bits"])
         out += struct.pack(f"<{len(words)}I", *words)
     return bytes(out)
