@@ -23,6 +23,7 @@ static struct {
     bool bitten;
     uint32_t surviving[3];
     bool pins_connected;
+    uint32_t stop_inputs, stop_edges;  // low now; have fallen since they were asked for
 
     struct sequence* armed;
     const struct sequence* following;  // from cycle following_from on; null when no swap is due
@@ -144,6 +145,12 @@ void board_host_corrupt_program(void) {
     board.armed->words[board.armed->header.program_bytes / 4 - 1] ^= 1;
 }
 
+void board_host_pull_stop_input(unsigned input, bool low) {
+    board.stop_inputs &= ~(1u << input);
+    if (low) board.stop_inputs |= 1u << input;
+    board.stop_edges |= board.stop_inputs;
+}
+
 bool board_host_pins_are_connected(void) {
     return board.pins_connected;
 }
@@ -157,6 +164,12 @@ void board_dark(void) {
 void board_connect_pins(uint8_t inverted_triggers) {
     (void)inverted_triggers;  // nobody looks at pins here
     board.pins_connected = true;
+}
+
+uint32_t board_stop_inputs(void) {
+    const uint32_t low = board.stop_inputs | board.stop_edges;
+    board.stop_edges = 0;
+    return low;
 }
 
 uint64_t board_time_us(void) {

@@ -49,7 +49,9 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
                                       .chain_bits = BOARD_CHAIN_BITS,
                                       .slots_max = OLS_SLOTS_MAX,
                                       .shift_ticks = sequence_shift_ticks(&board_sequence),
-                                      .slot_gap_ticks = sequence_slot_gap_ticks()};
+                                      .slot_gap_ticks = sequence_slot_gap_ticks(),
+                                      .lamps_lit_max = board_sequence.limits.lamps_lit_max,
+                                      .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }
@@ -73,8 +75,9 @@ static void answer_load_end(const struct ols_frame* request, struct reply* reply
 }
 
 static void answer_arm(const struct ols_frame* request, struct reply* reply) {
-    (void)request;
-    take_answer(stage_arm(&reply->payload.error), reply);
+    struct ols_arm arm;
+    memcpy(&arm, request->payload, sizeof arm);
+    take_answer(stage_arm(&arm, &reply->payload.error), reply);
 }
 
 static void answer_start(const struct ols_frame* request, struct reply* reply) {
@@ -125,7 +128,7 @@ static const struct command {
     {OLS_LOAD_BEGIN, sizeof(struct ols_load_begin), sizeof(struct ols_load_begin), answer_load_begin},
     {OLS_LOAD_CHUNK, sizeof(struct ols_load_chunk), OLS_PAYLOAD_BYTES_MAX, answer_load_chunk},
     {OLS_LOAD_END, 0, 0, answer_load_end},
-    {OLS_ARM, 0, 0, answer_arm},
+    {OLS_ARM, sizeof(struct ols_arm), sizeof(struct ols_arm), answer_arm},
     {OLS_START, 0, 0, answer_start},
     {OLS_STOP, 0, 0, answer_stop},
     {OLS_STATUS, 0, 0, answer_status},

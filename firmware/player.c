@@ -9,14 +9,15 @@
 #include "pio.h"
 #include "pulse.h"
 
-enum { SHIFTER_ORIGIN = TIMELINE_WORDS };
+enum { SHIFTER_ORIGIN = TIMELINE_WORDS, GUARD_ORIGIN = SHIFTER_ORIGIN + SHIFTER_WORDS };
 enum { FLAG_SEND = 4, FLAG_SENT = 5, FLAGS_ALL = 0xff, FLAGS_FOR_PROCESSOR = 7 };
 enum { SHIFT_TIMEOUT_US = 1000 };  // 40 times what a chain of 256 bits takes
-_Static_assert(TIMELINE_WORDS + SHIFTER_WORDS <= 32, "both programs fit the block's instruction memory");
+_Static_assert(GUARD_ORIGIN + GUARD_WORDS <= 32, "all programs fit the block's instruction memory");
 _Static_assert(TIMELINE_HALT == 0, "a starved FIFO jumps to the word 0");
 
 static const struct pio_machine timeline = {PIO0_BASE, 0};
 static const struct pio_machine shifter = {PIO0_BASE, 1};
+static const struct pio_machine guards[] = {{PIO0_BASE, 2}, {PIO0_BASE, 3}};  // of the first stop inputs
 #define TIMELINE_SHIFT_CONTROL (PIO_SHIFT_JOIN_TX | PIO_SHIFT_OUT_RIGHT)
 #define SHIFTER_SHIFT_CONTROL PIO_SHIFT_JOIN_TX
 
@@ -42,8 +43,10 @@ static uint32_t next_from;
 void player_init(void) {
     static const uint16_t timeline_program[] = TIMELINE_PROGRAM;
     static const uint16_t shifter_program[] = SHIFTER_PROGRAM;
+    static const uint16_t guard_program[] = GUARD_PROGRAM;
     pio_load(PIO0_BASE, 0, timeline_program, TIMELINE_WORDS);
     pio_load(PIO0_BASE, SHIFTER_ORIGIN, shifter_program, SHIFTER_WORDS);
+    pio_load(PIO0_BASE, GUARD_ORIGIN, guard_program, GUARD_WORDS);
 
     PIO_SM_CLKDIV(PIO0_BASE, timeline.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO0_BASE, timeline.machine) = PIO_EXEC_WRAP(TIMELINE_WRAP_TARGET, TIMELINE_WRAP);
@@ -54,6 +57,14 @@ void player_init(void) {
         PIO_EXEC_WRAP(SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET, SHIFTER_ORIGIN + SHIFTER_WRAP) |
         PIO_EXEC_STATUS_TX_BELOW(sequence_pattern_words(BOARD_CHAIN_BITS));
     PIO_SM_PINCTRL(PIO0_BASE, shifter.machine) = PIO_PINS_OUT(BOARD_PIN_DATA, 1) | PIO_PINS_SIDE(BOARD_PIN_CLK, 1);
+
+    for (uint32_t n = 0; n < 2; n++) {
+        PIO_SM_CLKDIV(PIO0_BASE, guards[n].machine) = PIO_CLKDIV(1);
+        PIO_SM_EXECCTRL(PIO0_BASE, guards[n].machine) =
+            PIO_EXEC_WRAP(GUARD_ORIGIN + GUARD_WRAP_TARGET, GUARD_ORIGIN + GUARD_WRAP);
+        PIO_SM_PINCTRL(PIO0_BASE, guards[n].machine) =
+            PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_IN(BOARD_PIN_STOP_INPUTS + n);
+    }
 
     player_stop();
     PIO_IRQ0_INTE(PIO0_BASE) = PIO_INTE_FLAG(0) | PIO_INTE_FLAG(1) | PIO_INTE_FLAG(2);
@@ -99,6 +110,8 @@ bool player_arm(const struct sequence* sequence) {
     set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
     pio_execute(timeline, PIO_JMP | TIMELINE_NEXT);
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
+    for (uint32_t n = 0; n < 2; n++) pio_execute(guards[n], PIO_JMP | GUARD_ORIGIN);
+    REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
     cycle_feed_start(&timeline_feed);
     cycle_feed_start(&shifter_feed);
     board_connect_pins(inverted_triggers(sequence));
@@ -171,6 +184,7 @@ void player_stop(void) {
     cycle_feed_stop(&shifter_feed);
     pio_stop(timeline, TIMELINE_SHIFT_CONTROL);
     pio_stop(shifter, SHIFTER_SHIFT_CONTROL);
+    for (uint32_t n = 0; n < 2; n++) pio_stop(guards[n], PIO_SHIFT_JOIN_TX);
     // The machines' output registers, too, so that connecting the pins again cannot light anything.
     pio_execute(timeline, PIO_MOV_PINS_NULL);
     pio_execute(shifter, PIO_MOV_PINS_NULL);

@@ -16,7 +16,7 @@
 #include "text.h"
 
 enum { CYCLE_END_TICKS = EVENTS_TICKS_MIN, KINDS_ALL = (1 << (OLS_DARK + 1)) - 1 };
-enum { SLOTS_A_STEP = 32 };
+enum { SLOTS_A_STEP = 16 };
 _Static_assert((int)TIMELINE_ENTER_TICKS == (int)CYCLE_END_TICKS, "a program may begin where another would go on");
 
 const struct ols_slot* sequence_slots(const struct sequence* sequence) {
@@ -209,6 +209,33 @@ static void play_slot(struct sequence_compiler* compiler, const struct ols_slot*
     events_play(events, sync_pin, TIMELINE_SYNC, rest_ticks);
 }
 
+static bool reject_limit(struct ols_error_reply* error, uint16_t slot, const char* reason, uint32_t figure,
+                         const char* remedy) {
+    reject(error, slot, reason, figure, remedy);
+    error->code = OLS_ERROR_OVER_LIMIT;
+    return false;
+}
+
+static bool add_light(struct sequence_compiler* compiler, const struct ols_slot* slot, const uint32_t* pattern,
+                      uint16_t number) {
+    const uint32_t lamps_max = compiler->board->limits.lamps_lit_max;
+    const uint32_t lamps = light_add(&compiler->use, pattern, compiler->sequence->pattern_words, slot->exposure_ticks);
+    if (lamps > lamps_max)
+        return reject_limit(compiler->error, number, "this board's supply lights ", lamps_max, " lamps at once");
+    return true;
+}
+
+static bool check_duty(const struct sequence_compiler* compiler) {
+    const uint32_t permille_max = compiler->board->limits.lamp_duty_max_permille;
+    uint32_t lamp;
+    const uint64_t lit_ticks = light_longest_ticks(&compiler->use, &lamp);
+    if (lit_ticks * 1000 > compiler->events.now_ticks * permille_max)
+        return reject_limit(compiler->error, OLS_NO_SLOT,
+                            "a lamp is lit for more of the cycle than its limit; chain bit ", lamp,
+                            ": make the exposures shorter");
+    return true;
+}
+
 static bool events_are_fine(struct sequence_compiler* compiler, uint16_t number) {
     const struct events* const events = &compiler->events;
     switch (events->problem) {
@@ -261,7 +288,7 @@ static bool end_cycle(struct sequence_compiler* compiler) {
     // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
     events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, CYCLE_END_TICKS);
     compiler->sequence->cycle_words = events->word_count;
-    return events_are_fine(compiler, (uint16_t)(header->slot_count - 1));
+    return events_are_fine(compiler, (uint16_t)(header->slot_count - 1)) && check_duty(compiler);
 }
 
 static bool add_slot(struct sequence_compiler* compiler) {
@@ -270,6 +297,7 @@ static bool add_slot(struct sequence_compiler* compiler) {
     const struct ols_slot* const slot = &sequence_slots(sequence)[number];
     const uint32_t* const pattern = sequence_patterns(sequence) + number * (uint32_t)sequence->pattern_words;
     if (!check_slot(compiler->board, slot, pattern, number, compiler->error)) return false;
+    if (!add_light(compiler, slot, pattern, number)) return false;
     play_slot(compiler, slot, number);
     return !compiler->refused && events_are_fine(compiler, number);
 }

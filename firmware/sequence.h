@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "events.h"
+#include "light_limits.h"
 #include "wire.h"
 
 #ifdef __cplusplus
@@ -19,6 +20,7 @@ extern "C" {
 struct sequence_board {
     uint16_t chain_bits;     // 1..OLS_CHAIN_BITS_MAX
     uint16_t shift_divider;  // of the shifter's clock
+    struct light_limits limits;
 };
 
 enum {
@@ -65,6 +67,7 @@ struct sequence_compiler {
     struct ols_error_reply* error;  // of the step that is under way
     uint32_t next_slot;
     struct events events;
+    struct light_use use;
     struct sequence_trigger_place {
         uint32_t next_slot;
         uint64_t light_ticks;     // of next_slot, since the cycle's begin
@@ -78,7 +81,8 @@ enum sequence_progress { SEQUENCE_UNFINISHED, SEQUENCE_MADE, SEQUENCE_REFUSED };
 // Begins with the program that `sequence` holds (header, and words as loaded).
 void sequence_begin(struct sequence_compiler* compiler, const struct sequence_board* board, struct sequence* sequence);
 
-// SEQUENCE_REFUSED, with `error` filled in (OLS_ERROR_BAD_PROGRAM): the program cannot be played exactly as it says.
+// SEQUENCE_REFUSED, with `error` filled in: the program cannot be played exactly as it says (OLS_ERROR_BAD_PROGRAM), or
+// lights more than lamps or supply stand (OLS_ERROR_OVER_LIMIT).
 enum sequence_progress sequence_step(struct sequence_compiler* compiler, struct ols_error_reply* error);
 
 #ifdef __cplusplus

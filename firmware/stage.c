@@ -31,6 +31,8 @@ static uint32_t checked_crc32;
 static uint64_t start_us;
 static uint32_t stamps_read;
 static uint32_t cycles_of_done;   // of the program that has played to its end
+static uint32_t heartbeat_ticks;  // 0: the host may be silent
+static uint64_t heard_us;         // when the host's last request came
 static uint8_t programs_swapped;  // since start
 
 static bool refuse(struct ols_error_reply* error, enum ols_error_code code, const char* reason) {
@@ -141,11 +143,29 @@ static void follow_play(void) {
     fault_note_progress(trigger_log_slot(), now_ticks);
 }
 
+// The fault that a stop input, or the host's silence, means; OLS_FAULT_NONE when all is well. For the first two inputs it
+// is dark already (pulse.pio, guard).
+static enum ols_fault cause_from_outside(uint32_t stops, bool host_is_there) {
+    if (stops & 1u << BOARD_EMERGENCY_STOP) return OLS_FAULT_EMERGENCY_STOP;
+    if (stops & 1u << BOARD_OVER_TEMPERATURE) return OLS_FAULT_OVER_TEMPERATURE;
+    if (stops & 1u << BOARD_OPEN_LAMP) return OLS_FAULT_OPEN_LAMP;
+    if (!host_is_there) return OLS_FAULT_HOST_LOST;
+    const uint64_t silent_ticks = (board_time_us() - heard_us) * BOARD_TICKS_PER_US;
+    return heartbeat_ticks != 0 && silent_ticks > heartbeat_ticks ? OLS_FAULT_HEARTBEAT : OLS_FAULT_NONE;
+}
+
 void stage_poll(bool host_is_there) {
+    const uint32_t stops = board_stop_inputs();  // in every state: an edge that nobody takes would not let it sleep
+    if (state == OLS_STATE_ARMED || state == OLS_STATE_PLAYING) {
+        // First, for the program's own faults may be its consequences.
+        const enum ols_fault cause = cause_from_outside(stops, host_is_there);
+        if (cause != OLS_FAULT_NONE) {
+            const bool playing = state == OLS_STATE_PLAYING;
+            if (playing) read_witness();
+            return end_in_fault(cause, playing ? ticks_since_start() : 0);
+        }
+    }
     if (state == OLS_STATE_PLAYING) follow_play();
-    if (host_is_there) return;
-    if (state == OLS_STATE_PLAYING || state == OLS_STATE_ARMED)
-        end_in_fault(OLS_FAULT_HOST_LOST, state == OLS_STATE_PLAYING ? ticks_since_start() : 0);
 }
 
 bool stage_load_begin(const struct ols_load_begin* begin, struct ols_error_reply* error) {
@@ -225,15 +245,29 @@ enum stage_answer stage_load_end(struct ols_error_reply* error) {
 }
 
 void stage_begin_request(void) {
+    heard_us = board_time_us();
     checked_bytes = 0;
     checked_crc32 = 0;
 }
 
-enum stage_answer stage_arm(struct ols_error_reply* error) {
+// What must be so before anything may be lit.
+static bool arm_is_safe(const struct ols_arm* arm, struct ols_error_reply* error) {
+    if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
+        return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
+    board_stop_inputs();  // forgets edges of the past
+    const uint32_t stops = board_stop_inputs();
+    if (stops & 1u << BOARD_EMERGENCY_STOP)
+        return refuse(error, OLS_ERROR_NOT_SAFE, "the emergency stop is pressed, or its wire is open: release it");
+    return stops == 0 || refuse(error, OLS_ERROR_NOT_SAFE,
+                                "a lamp driver reports a fault (over-temperature, open lamp), or its wire is open");
+}
+
+enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* error) {
     if (state != OLS_STATE_LOADED && state != OLS_STATE_DONE) {
         refuse_state(error, "no program is ready: load one, and stop what is armed or playing");
         return STAGE_REFUSED;
     }
+    if (checked_bytes == 0 && !arm_is_safe(arm, error)) return STAGE_REFUSED;
     if (!check_words(current)) return STAGE_BUSY;
     if (!words_are_good(current)) {
         end_in_fault(OLS_FAULT_BAD_MEMORY, 0);
@@ -249,6 +283,7 @@ enum stage_answer stage_arm(struct ols_error_reply* error) {
         refuse_fault(error);
         return STAGE_REFUSED;
     }
+    heartbeat_ticks = arm->heartbeat_ticks;
     state = OLS_STATE_ARMED;
     return STAGE_OK;
 }

@@ -45,7 +45,7 @@ enum ols_message {
     OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed; while playing, the next program is loaded
     OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
     OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
-    OLS_ARM = 0x05,               // loaded or done -> armed: first pattern shifted, everything ready
+    OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
     OLS_START = 0x06,             // armed -> playing
     OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
     OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
@@ -74,8 +74,10 @@ struct ols_hello_reply {
     uint32_t capabilities;  // enum ols_capability bits
     uint16_t chain_bits;    // of this board's shift chain
     uint16_t slots_max;
-    uint32_t shift_ticks;     // to send one pattern
-    uint32_t slot_gap_ticks;  // period_ticks - exposure_ticks must be at least this
+    uint32_t shift_ticks;             // to send one pattern
+    uint32_t slot_gap_ticks;          // period_ticks - exposure_ticks must be at least this
+    uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
+    uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
 } OLS_PACKED;
 
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
@@ -120,6 +122,12 @@ struct ols_slot {
     int32_t trigger_offset_ticks;  // from the light to the triggers, before it when negative
 } OLS_PACKED_WORDS;
 
+#define OLS_HEARTBEAT_TICKS_MIN 625000  // 5 ms: the board looks every millisecond or two
+
+struct ols_arm {
+    uint32_t heartbeat_ticks;  // without a message for longer than this, armed or playing, is a fault; 0: never
+} OLS_PACKED;
+
 enum ols_state {
     OLS_STATE_IDLE = 0,  // no program
     OLS_STATE_LOADED = 1,
@@ -152,7 +160,11 @@ enum ols_fault {
     OLS_FAULT_HOST_LOST = 4,         // the bus was reset, suspended or unplugged while armed or playing
     OLS_FAULT_WATCHDOG = 5,          // the processor hung and was reset
     OLS_FAULT_PROCESSOR = 6,         // hard fault or unexpected interrupt
-    OLS_FAULT_BAD_MEMORY = 7         // the program in memory no longer has its CRC
+    OLS_FAULT_BAD_MEMORY = 7,        // the program in memory no longer has its CRC
+    OLS_FAULT_EMERGENCY_STOP = 8,    // the emergency stop was pressed, or its wire is open
+    OLS_FAULT_OVER_TEMPERATURE = 9,  // said a lamp driver
+    OLS_FAULT_OPEN_LAMP = 10,        // said a lamp driver
+    OLS_FAULT_HEARTBEAT = 11         // no message from the host for the time chosen when arming
 };
 
 struct ols_status_reply {
@@ -201,7 +213,9 @@ enum ols_error_code {
     OLS_ERROR_BAD_OFFSET = 4,
     OLS_ERROR_BAD_CRC = 5,
     OLS_ERROR_BAD_PROGRAM = 6,
-    OLS_ERROR_FAULT_LATCHED = 7
+    OLS_ERROR_FAULT_LATCHED = 7,
+    OLS_ERROR_OVER_LIMIT = 8,  // a lamp would be lit for too long, or too many at once
+    OLS_ERROR_NOT_SAFE = 9     // the emergency stop or a driver says no
 };
 
 struct ols_error_reply {
@@ -212,11 +226,12 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 64, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 68, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
+OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 4, "arm");
 OLS_WIRE_ASSERT(sizeof(struct ols_swap_reply) == 8, "swap reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 44, "status reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");

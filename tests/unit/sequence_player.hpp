@@ -25,7 +25,7 @@ struct Slot {
 };
 
 struct Program {
-    sequence_board board{176, 1};
+    sequence_board board{176, 1, {OLS_CHAIN_BITS_MAX, 1000}};
     uint32_t cycles = 1;
     uint32_t lead_ticks = 0;
     ols_trigger triggers[OLS_TRIGGERS]{};

@@ -61,7 +61,6 @@ struct TwoSlots {
 TEST(Wire, messages_without_payload) {
     expect_golden("load_begin_reply", OLS_LOAD_BEGIN | OLS_REPLY, {});
     expect_golden("load_end", OLS_LOAD_END, {});
-    expect_golden("arm", OLS_ARM, {});
     expect_golden("start", OLS_START, {});
     expect_golden("stop", OLS_STOP, {});
     expect_golden("status", OLS_STATUS, {});
@@ -82,6 +81,8 @@ TEST(Wire, hello_and_its_reply) {
     reply.slots_max = 1024;
     reply.shift_ticks = 1259;
     reply.slot_gap_ticks = 27;
+    reply.lamps_lit_max = 171;
+    reply.lamp_duty_max_permille = 750;
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 
@@ -99,6 +100,10 @@ TEST(Wire, loading) {
             2500,
             {{-2000, 0, 0, 0, 0}, {100, 6250, 1 << OLS_BASIS | 1 << OLS_MATTE | 1 << OLS_DARK, 1, 0}, {}, {}}}));
     expect_golden("load_chunk", OLS_LOAD_CHUNK, join(ols_load_chunk{0}, program));
+}
+
+TEST(Wire, arm) {
+    expect_golden("arm", OLS_ARM, join(ols_arm{12500000}));
 }
 
 TEST(Wire, swap_reply) {

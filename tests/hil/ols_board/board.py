@@ -94,7 +94,7 @@ class Link:
 
     def ask(self, message_type, payload=b""):
         """Sends a request and returns the reply's payload. Raises BoardError for an error reply."""
-        self.request_id += 1
+        self.request_id = (self.request_id + 1) & 0xFFFF
         status = self.usb.write(wire.frame(message_type, self.request_id, payload))
         if status != OK:
             raise ConnectionError(f"transfer status {status}")
@@ -115,7 +115,7 @@ class Link:
 
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
-                 "slots_max", "shift_ticks", "slot_gap_ticks")
+                 "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 
@@ -131,9 +131,12 @@ class Link:
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)
 
-    def play(self, program):
+    def arm(self, heartbeat_ticks=0):
+        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks))
+
+    def play(self, program, heartbeat_ticks=0):
         self.load(program)
-        self.ask(wire.ARM)
+        self.arm(heartbeat_ticks)
         self.ask(wire.START)
 
     def swap(self):
