@@ -122,8 +122,9 @@ def test_a_silent_host_is_noticed_within_two_milliseconds_of_the_time_chosen(emu
     heartbeat = 30 * MS
     link.play(paper_program(cycles=0, slots=18), heartbeat_ticks=heartbeat)
     for _ in range(20):
-        assert link.status()["state"] == wire.PLAYING
-        link.usb.read(timeout_us=20_000)  # nothing comes: board time passes
+        heard = link.status()
+        assert heard["state"] == wire.PLAYING
+        link.usb.read(timeout_us=10_000)  # nothing comes: board time passes
     link.usb.read(timeout_us=60_000)
     status = link.status()
     assert wire.FAULTS[status["fault"]] == "heartbeat"
@@ -131,9 +132,8 @@ def test_a_silent_host_is_noticed_within_two_milliseconds_of_the_time_chosen(emu
     changes = check_trace.read_vcd(board.trace)
     rises = [tick for tick, name, level in changes if name == "TRIG0" and level]
     last = max(tick for tick, name, _ in changes if name in LIT)
-    # The last message came 20 ms after the one before it.
-    assert last - rises[0] < status["fault_ticks"] + 2 * MS
-    assert (20 * 20 - 1) * MS < status["fault_ticks"] < (20 * 20 + 60) * MS
+    assert heartbeat <= status["fault_ticks"] - heard["now_ticks"] <= heartbeat + 2 * MS
+    assert last - rises[0] <= status["fault_ticks"] + MS // 100  # dark within 10 us of noticing
 
 
 def test_a_program_beyond_what_lamps_or_supply_stand_is_refused(emulated):
