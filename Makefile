@@ -31,7 +31,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 	@python3 tools/stagesim/assets/fetch.py
 
 demo: all assets ## the whole system once, end to end; results in out/demo
-	@python3 tools/demo/demo.py --out out/demo
+	@$(PYTHON) tools/demo/demo.py --out out/demo
 
 test: all checked assets lint-fast unit fuzz-smoke hil ## everything that needs no hardware
 	@echo "make test: all passed"
