@@ -23,8 +23,11 @@ static struct {
     bool bitten;
     uint32_t surviving[3];
     bool pins_connected;
+    uint32_t stop_inputs, stop_edges;  // low now; have fallen since they were asked for
 
     struct sequence* armed;
+    const struct sequence* following;  // from cycle following_from on; null when no swap is due
+    uint32_t following_from;
     bool playing;
     uint64_t start_ticks;
     uint64_t next_rise_ticks;  // of next_slot, on the board's clock
@@ -65,24 +68,29 @@ void board_host_bite(void) {
     start_firmware();
 }
 
-static void turn_main_loop(void) {
+static bool turn_main_loop(void) {
     stage_poll(transport_is_attached());
-    link_poll();
+    return link_poll();
 }
 
 // Fires what is due until now.
 static void play(void) {
-    const struct sequence* const sequence = board.armed;
     while (board.playing && board.next_rise_ticks <= now_ticks()) {
-        const struct sequence_slot* const slot = &sequence->slots[board.next_slot];
-        if (slot->trigger_mask & 1) {
-            const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks;
+        const struct sequence* const sequence = board.armed;
+        const struct ols_slot* const slot = &sequence_slots(sequence)[board.next_slot];
+        if (sequence_triggers(sequence, slot) & 1) {
+            const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks +
+                                  (uint64_t)(int64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
             board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
         }
         board.next_rise_ticks += slot->period_ticks;
-        if (++board.next_slot < sequence->slot_count) continue;
+        if (++board.next_slot < sequence->header.slot_count) continue;
         board.next_slot = 0;
-        if (++board.cycle == sequence->cycles) {
+        if (++board.cycle == board.following_from && board.following) {
+            board.armed = (struct sequence*)board.following;
+            board.following = NULL;
+            board.cycle = 0;
+        } else if (board.cycle == sequence->header.cycles) {
             board.playing = false;
             board.events |= PLAYER_DONE;
         }
@@ -111,8 +119,8 @@ size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* ans
     board.incoming = bytes;
     board.incoming_bytes = byte_count;
     board.answer_bytes = 0;
-    do turn_main_loop();
-    while (board.incoming_bytes > 0);
+    while (turn_main_loop() || board.incoming_bytes > 0) {
+    }
     const size_t answer_bytes = board.answer_bytes < answer_bytes_max ? board.answer_bytes : answer_bytes_max;
     memcpy(answer, board.answer, answer_bytes);
     return answer_bytes;
@@ -134,7 +142,13 @@ void board_host_delay_triggers(uint32_t ticks) {
 }
 
 void board_host_corrupt_program(void) {
-    board.armed->patterns[0] ^= 1;
+    board.armed->words[board.armed->header.program_bytes / 4 - 1] ^= 1;
+}
+
+void board_host_pull_stop_input(unsigned input, bool low) {
+    board.stop_inputs &= ~(1u << input);
+    if (low) board.stop_inputs |= 1u << input;
+    board.stop_edges |= board.stop_inputs;
 }
 
 bool board_host_pins_are_connected(void) {
@@ -147,8 +161,15 @@ void board_dark(void) {
     board.pins_connected = false;
 }
 
-void board_connect_pins(void) {
+void board_connect_pins(uint8_t inverted_triggers) {
+    (void)inverted_triggers;  // nobody looks at pins here
     board.pins_connected = true;
+}
+
+uint32_t board_stop_inputs(void) {
+    const uint32_t low = board.stop_inputs | board.stop_edges;
+    board.stop_edges = 0;
+    return low;
 }
 
 uint64_t board_time_us(void) {
@@ -184,7 +205,7 @@ uint32_t board_boot_nonce(void) {
 bool player_arm(const struct sequence* sequence) {
     board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
     board.events = 0;
-    board_connect_pins();
+    board_connect_pins(0);
     if (!board.shifter_starved) return true;
     player_stop();
     return false;
@@ -197,15 +218,30 @@ void player_start(void) {
     board.next_slot = board.cycle = 0;
 }
 
-uint32_t player_take_events(void) {
-    const uint32_t events = board.events;
-    board.events = 0;
-    return events;
+uint32_t player_events(void) {
+    return board.events;
+}
+
+bool player_swap(const struct sequence* following, uint32_t* after_cycles) {
+    *after_cycles = board.cycle + 2;
+    if (board.armed->header.cycles != 0 && *after_cycles > board.armed->header.cycles) return false;
+    board.following = following;
+    board.following_from = *after_cycles;
+    return true;
+}
+
+bool player_swapping(void) {
+    return board.following != NULL;
+}
+
+void player_poll(void) {
+    // play() follows the cycles.
 }
 
 void player_stop(void) {
     board_dark();
     board.playing = false;
+    board.following = NULL;
     board.events = 0;
 }
 

@@ -7,7 +7,7 @@
 #include "rp2040.h"
 
 enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
-#define WAKE_INTERRUPTS (1u << IRQ_TIMER_0 | 1u << IRQ_USBCTRL | 1u << IRQ_PIO0_0)
+#define WAKE_INTERRUPTS (1u << IRQ_TIMER_0 | 1u << IRQ_USBCTRL | 1u << IRQ_PIO0_0 | 1u << IRQ_GPIO)
 
 // In the fourth scratch register while this firmware runs: the boot ROM and debuggers reset by watchdog, too, and those
 // are no faults.
@@ -56,10 +56,13 @@ static void init_clocks(void) {
     WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | 12;  // 12 MHz / 12: microseconds for timer and watchdog (4.7.2)
 }
 
+static uint32_t inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN;
+
 static void set_pins(uint32_t function) {
     for (uint32_t pin = BOARD_PIN_DATA; pin < BOARD_PINS_END; pin++) {
-        const bool inverted = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
-        GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | (inverted ? GPIO_OUTPUT_INVERTED : 0);
+        // Both ways, so that the witness sees a trigger as the timeline plays it.
+        const uint32_t inversion = inverted_pins >> pin & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
+        GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | inversion;
     }
 }
 
@@ -68,7 +71,8 @@ void board_dark(void) {
     set_pins(GPIO_FUNCTION_SIO);
 }
 
-void board_connect_pins(void) {
+void board_connect_pins(uint8_t inverted_triggers) {
+    inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN | (uint32_t)inverted_triggers << BOARD_PIN_TRIG0;
     set_pins(GPIO_FUNCTION_PIO0);
 }
 
@@ -77,6 +81,10 @@ static void init_pins(void) {
     for (uint32_t pin = BOARD_PIN_DATA; pin < BOARD_PINS_END; pin++) {
         const bool pull_up = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
         PAD_GPIO(pin) = PAD_INPUT | PAD_4MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
+    }
+    for (uint32_t pin = BOARD_PIN_STOP_INPUTS; pin < BOARD_PIN_STOP_INPUTS + BOARD_STOP_INPUTS; pin++) {
+        PAD_GPIO(pin) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
+        REGISTER_SET((uint32_t)&GPIO_INTE(pin)) = GPIO_EDGE_LOW(pin);
     }
 }
 
@@ -92,6 +100,17 @@ void board_init(void) {
     PSM_WDSEL = PSM_ALL_BUT_OSCILLATORS;
     board_feed_watchdog();
     WATCHDOG_CTRL = WATCHDOG_ENABLE;
+}
+
+uint32_t board_stop_inputs(void) {
+    uint32_t low = 0;
+    for (uint32_t n = 0; n < BOARD_STOP_INPUTS; n++) {
+        const uint32_t pin = BOARD_PIN_STOP_INPUTS + n;
+        const bool fell = GPIO_INTR(pin) & GPIO_EDGE_LOW(pin);
+        GPIO_INTR(pin) = GPIO_EDGE_LOW(pin);
+        if (fell || !(GPIO_STATUS(pin) & GPIO_FROM_PAD)) low |= 1u << n;
+    }
+    return low;
 }
 
 uint64_t board_time_us(void) {

@@ -17,9 +17,9 @@ static struct ols_frame_parser parser;
 static uint32_t session;
 static uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
 
-// A reply being made; without `ok` it is the error.
+// A reply being made; without `ok` it is the error. `busy`: the request takes another turn of the main loop.
 struct reply {
-    bool ok;
+    bool ok, busy;
     size_t payload_bytes;
     union {
         struct ols_hello_reply hello;
@@ -28,9 +28,15 @@ struct reply {
             struct ols_trigger_log_reply header;
             struct ols_trigger_log_entry entries[OLS_LOG_ENTRIES_MAX];
         } __attribute__((packed)) log;
+        struct ols_swap_reply swap;
         struct ols_error_reply error;
     } payload;
 };
+
+static void take_answer(enum stage_answer answer, struct reply* reply) {
+    reply->ok = answer == STAGE_OK;
+    reply->busy = answer == STAGE_BUSY;
+}
 
 static void answer_hello(const struct ols_frame* request, struct reply* reply) {
     (void)request;  // its hash is for boards that could speak more than one layout
@@ -39,10 +45,13 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
                                       .firmware_version = BOARD_FIRMWARE_VERSION,
                                       .boot_nonce = board_boot_nonce(),
                                       .tick_hz = BOARD_TICK_HZ,
+                                      .capabilities = OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP,
                                       .chain_bits = BOARD_CHAIN_BITS,
                                       .slots_max = OLS_SLOTS_MAX,
                                       .shift_ticks = sequence_shift_ticks(&board_sequence),
-                                      .slot_gap_ticks = sequence_slot_gap_ticks()};
+                                      .slot_gap_ticks = sequence_slot_gap_ticks(),
+                                      .lamps_lit_max = board_sequence.limits.lamps_lit_max,
+                                      .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }
@@ -62,12 +71,13 @@ static void answer_load_chunk(const struct ols_frame* request, struct reply* rep
 
 static void answer_load_end(const struct ols_frame* request, struct reply* reply) {
     (void)request;
-    reply->ok = stage_load_end(&reply->payload.error);
+    take_answer(stage_load_end(&reply->payload.error), reply);
 }
 
 static void answer_arm(const struct ols_frame* request, struct reply* reply) {
-    (void)request;
-    reply->ok = stage_arm(&reply->payload.error);
+    struct ols_arm arm;
+    memcpy(&arm, request->payload, sizeof arm);
+    take_answer(stage_arm(&arm, &reply->payload.error), reply);
 }
 
 static void answer_start(const struct ols_frame* request, struct reply* reply) {
@@ -78,6 +88,15 @@ static void answer_start(const struct ols_frame* request, struct reply* reply) {
 static void answer_stop(const struct ols_frame* request, struct reply* reply) {
     (void)request;
     reply->ok = stage_stop(&reply->payload.error);
+}
+
+static void answer_swap(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    struct ols_swap_reply swap;
+    take_answer(stage_swap(&swap, &reply->payload.error), reply);
+    if (!reply->ok) return;
+    reply->payload.swap = swap;
+    reply->payload_bytes = sizeof swap;
 }
 
 static void answer_status(const struct ols_frame* request, struct reply* reply) {
@@ -109,13 +128,14 @@ static const struct command {
     {OLS_LOAD_BEGIN, sizeof(struct ols_load_begin), sizeof(struct ols_load_begin), answer_load_begin},
     {OLS_LOAD_CHUNK, sizeof(struct ols_load_chunk), OLS_PAYLOAD_BYTES_MAX, answer_load_chunk},
     {OLS_LOAD_END, 0, 0, answer_load_end},
-    {OLS_ARM, 0, 0, answer_arm},
+    {OLS_ARM, sizeof(struct ols_arm), sizeof(struct ols_arm), answer_arm},
     {OLS_START, 0, 0, answer_start},
     {OLS_STOP, 0, 0, answer_stop},
     {OLS_STATUS, 0, 0, answer_status},
     {OLS_READ_TRIGGER_LOG, sizeof(struct ols_read_trigger_log), sizeof(struct ols_read_trigger_log),
      answer_read_trigger_log},
     {OLS_CLEAR_FAULT, 0, 0, answer_clear_fault},
+    {OLS_SWAP, 0, 0, answer_swap},
 };
 
 static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
@@ -136,35 +156,43 @@ static void answer(const struct ols_frame* request, struct reply* reply) {
     refuse(reply, OLS_ERROR_UNKNOWN_MESSAGE, "unknown message: update the firmware with `make flash`");
 }
 
-static void handle(const struct ols_frame* request) {
-    static struct reply reply;  // too big for the stack of 8 KB to be careless with
+// True when the request has been answered.
+static bool handle(const struct ols_frame* request) {
+    static struct reply reply;  // too big for the stack of 4 KB to be careless with
     memset(&reply, 0, sizeof reply);
     reply.ok = true;
     answer(request, &reply);
+    if (reply.busy) return false;
     const uint16_t type = (reply.ok ? request->type : OLS_ERROR) | OLS_REPLY;
     const size_t payload_bytes = reply.ok ? reply.payload_bytes : sizeof reply.payload.error;
     transport_send(reply_frame, ols_frame_encode(type, request->request_id, &reply.payload, payload_bytes, reply_frame,
                                                  sizeof reply_frame));
+    return true;
 }
 
-void link_poll(void) {
+bool link_poll(void) {
+    static struct ols_frame request;
+    static bool unanswered;
     if (session != transport_session()) {
         session = transport_session();
         memset(&parser, 0, sizeof parser);
+        unanswered = false;
     }
     static uint8_t packet[TRANSPORT_PACKET_BYTES];
     static size_t packet_bytes, packet_used;
     while (transport_can_send()) {
-        struct ols_frame request;
-        if (ols_frame_parser_read(&parser, &request)) {
-            handle(&request);
+        if (unanswered || ols_frame_parser_read(&parser, &request)) {
+            if (!unanswered) stage_begin_request();
+            unanswered = !handle(&request);
+            if (unanswered) return true;
             continue;
         }
         if (packet_used == packet_bytes) {
             packet_used = 0;
             packet_bytes = transport_receive(packet);
-            if (packet_bytes == 0) return;
+            if (packet_bytes == 0) return false;
         }
         packet_used += ols_frame_parser_write(&parser, packet + packet_used, packet_bytes - packet_used);
     }
+    return false;
 }

@@ -3,7 +3,10 @@
 #ifndef OLS_LINK_H
 #define OLS_LINK_H
 
-// Once each turn of the main loop: takes what has arrived and answers it, one request at a time, in order.
-void link_poll(void);
+#include <stdbool.h>
+
+// Once each turn of the main loop: takes what has arrived and answers it, one request at a time, in order. True when it
+// is not to wait for anything before the next turn: a long request is being worked on.
+bool link_poll(void);
 
 #endif

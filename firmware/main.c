@@ -20,7 +20,6 @@ int main(void) {
         board_feed_watchdog();
         usb_poll();
         stage_poll(transport_is_attached());
-        link_poll();
-        board_sleep();
+        if (!link_poll()) board_sleep();
     }
 }

@@ -1,37 +1,52 @@
 // SPDX-License-Identifier: MIT
-// Player: PIO block 0 with the timeline and the shifter of pulse.pio, each fed by a pair of DMA channels: one copies
-// the table to the machine's FIFO, the other starts the first again from the top, so cycles follow without a gap.
+// Player: PIO block 0 with the timeline and the shifter of pulse.pio, each with a cycle feed.
 #include "player.h"
 
+#include <stddef.h>
+
 #include "board.h"
+#include "cycle_feed.h"
 #include "pio.h"
 #include "pulse.h"
 
-enum { SHIFTER_ORIGIN = TIMELINE_WORDS };
+enum { SHIFTER_ORIGIN = TIMELINE_WORDS, GUARD_ORIGIN = SHIFTER_ORIGIN + SHIFTER_WORDS };
 enum { FLAG_SEND = 4, FLAG_SENT = 5, FLAGS_ALL = 0xff, FLAGS_FOR_PROCESSOR = 7 };
 enum { SHIFT_TIMEOUT_US = 1000 };  // 40 times what a chain of 256 bits takes
-_Static_assert(TIMELINE_WORDS + SHIFTER_WORDS <= 32, "both programs fit the block's instruction memory");
+_Static_assert(GUARD_ORIGIN + GUARD_WORDS <= 32, "all programs fit the block's instruction memory");
 _Static_assert(TIMELINE_HALT == 0, "a starved FIFO jumps to the word 0");
 
 static const struct pio_machine timeline = {PIO0_BASE, 0};
 static const struct pio_machine shifter = {PIO0_BASE, 1};
+static const struct pio_machine guards[] = {{PIO0_BASE, 2}, {PIO0_BASE, 3}};  // of the first stop inputs
 #define TIMELINE_SHIFT_CONTROL (PIO_SHIFT_JOIN_TX | PIO_SHIFT_OUT_RIGHT)
 #define SHIFTER_SHIFT_CONTROL PIO_SHIFT_JOIN_TX
 
-struct feed {
-    uint32_t table_channel, restart_channel;
-    uint32_t request;
-    struct pio_machine machine;
-};
-static const struct feed timeline_feed = {0, 1, DMA_REQUEST_PIO0_TX0, {PIO0_BASE, 0}};
-static const struct feed shifter_feed = {2, 3, DMA_REQUEST_PIO0_TX1, {PIO0_BASE, 1}};
-static uint32_t table_addresses[2];  // read by the restart channels
+// The feeds are never so many cycles apart: a FIFO of 8 words holds two of the shortest cycles.
+enum { FEEDS_APART = 16, RING_USED = CYCLE_FEED_RING - FEEDS_APART };
+
+#define IN_RINGS __attribute__((section(".rings"), aligned(4 * CYCLE_FEED_RING)))
+static uint32_t timeline_counts[CYCLE_FEED_RING] IN_RINGS;
+static const uint32_t* timeline_tables[CYCLE_FEED_RING] IN_RINGS;
+static uint32_t shifter_counts[CYCLE_FEED_RING] IN_RINGS;
+static const uint32_t* shifter_tables[CYCLE_FEED_RING] IN_RINGS;
+static const struct cycle_feed timeline_feed = {{PIO0_BASE, 0},  DMA_REQUEST_PIO0_TX0, 0, 1, 2,
+                                                timeline_counts, timeline_tables};
+static const struct cycle_feed shifter_feed = {{PIO0_BASE, 1}, DMA_REQUEST_PIO0_TX1, 3, 5, 6,
+                                               shifter_counts, shifter_tables};
+
+static const struct sequence* playing;
+static uint32_t playing_from;        // cycle of the feeds, since arm, in which `playing` began
+static uint32_t begun;               // cycles begun by the feed that is ahead, since arm
+static const struct sequence* next;  // follows from cycle next_from on; null when no swap is under way
+static uint32_t next_from;
 
 void player_init(void) {
     static const uint16_t timeline_program[] = TIMELINE_PROGRAM;
     static const uint16_t shifter_program[] = SHIFTER_PROGRAM;
+    static const uint16_t guard_program[] = GUARD_PROGRAM;
     pio_load(PIO0_BASE, 0, timeline_program, TIMELINE_WORDS);
     pio_load(PIO0_BASE, SHIFTER_ORIGIN, shifter_program, SHIFTER_WORDS);
+    pio_load(PIO0_BASE, GUARD_ORIGIN, guard_program, GUARD_WORDS);
 
     PIO_SM_CLKDIV(PIO0_BASE, timeline.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO0_BASE, timeline.machine) = PIO_EXEC_WRAP(TIMELINE_WRAP_TARGET, TIMELINE_WRAP);
@@ -43,31 +58,23 @@ void player_init(void) {
         PIO_EXEC_STATUS_TX_BELOW(sequence_pattern_words(BOARD_CHAIN_BITS));
     PIO_SM_PINCTRL(PIO0_BASE, shifter.machine) = PIO_PINS_OUT(BOARD_PIN_DATA, 1) | PIO_PINS_SIDE(BOARD_PIN_CLK, 1);
 
+    for (uint32_t n = 0; n < 2; n++) {
+        PIO_SM_CLKDIV(PIO0_BASE, guards[n].machine) = PIO_CLKDIV(1);
+        PIO_SM_EXECCTRL(PIO0_BASE, guards[n].machine) =
+            PIO_EXEC_WRAP(GUARD_ORIGIN + GUARD_WRAP_TARGET, GUARD_ORIGIN + GUARD_WRAP);
+        PIO_SM_PINCTRL(PIO0_BASE, guards[n].machine) =
+            PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_IN(BOARD_PIN_STOP_INPUTS + n);
+    }
+
     player_stop();
     PIO_IRQ0_INTE(PIO0_BASE) = PIO_INTE_FLAG(0) | PIO_INTE_FLAG(1) | PIO_INTE_FLAG(2);
 }
 
-static void start_feed(const struct feed* feed, const uint32_t* table, uint32_t words, uint32_t* table_address) {
-    *table_address = (uint32_t)table;
-    DMA_READ_ADDR(feed->restart_channel) = (uint32_t)table_address;
-    DMA_WRITE_ADDR(feed->restart_channel) = (uint32_t)&DMA_AL3_READ_ADDR_TRIG(feed->table_channel);
-    DMA_TRANS_COUNT(feed->restart_channel) = 1;
-    DMA_AL1_CTRL(feed->restart_channel) = DMA_CTRL_ENABLE | DMA_CTRL_HIGH_PRIORITY | DMA_CTRL_WORDS |
-                                          DMA_CTRL_CHAIN_TO(feed->restart_channel) | DMA_CTRL_PACE(DMA_REQUEST_NONE);
-    DMA_READ_ADDR(feed->table_channel) = (uint32_t)table;
-    DMA_WRITE_ADDR(feed->table_channel) = (uint32_t)&PIO_TXF(feed->machine.block, feed->machine.machine);
-    DMA_TRANS_COUNT(feed->table_channel) = words;
-    DMA_CTRL_TRIG(feed->table_channel) = DMA_CTRL_ENABLE | DMA_CTRL_HIGH_PRIORITY | DMA_CTRL_WORDS |
-                                         DMA_CTRL_INCREMENT_READ | DMA_CTRL_CHAIN_TO(feed->restart_channel) |
-                                         DMA_CTRL_PACE(feed->request);
-}
-
-static void stop_feed(const struct feed* feed) {
-    // Disabled first, lest one restarts the other during the abort.
-    DMA_AL1_CTRL(feed->restart_channel) = 0;
-    DMA_AL1_CTRL(feed->table_channel) = 0;
-    DMA_CHAN_ABORT = 1u << feed->table_channel | 1u << feed->restart_channel;
-    while ((DMA_AL1_CTRL(feed->table_channel) | DMA_AL1_CTRL(feed->restart_channel)) & DMA_CTRL_BUSY) {
+// Gives every cycle in first..end-1 to the sequence.
+static void set_cycles(const struct sequence* sequence, uint32_t first, uint32_t end) {
+    for (uint32_t n = first; n != end; n++) {
+        cycle_feed_set(&timeline_feed, n, sequence_enter(sequence) + 1, sequence->cycle_words);
+        cycle_feed_set(&shifter_feed, n, sequence_patterns(sequence), sequence_patterns_words(sequence));
     }
 }
 
@@ -88,15 +95,26 @@ static bool send_first_pattern(void) {
     return true;
 }
 
+static uint8_t inverted_triggers(const struct sequence* sequence) {
+    uint32_t inverted = 0;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++) inverted |= (uint32_t)sequence->header.triggers[n].active_low << n;
+    return (uint8_t)inverted;
+}
+
 bool player_arm(const struct sequence* sequence) {
     player_stop();
-    set_scratch(timeline, sequence->cycles - 1, PIO_MOV_Y_OSR);
+    playing = sequence;
+    playing_from = begun = 0;
+    set_cycles(sequence, 0, CYCLE_FEED_RING);
+    set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
     set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
     pio_execute(timeline, PIO_JMP | TIMELINE_NEXT);
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
-    start_feed(&timeline_feed, sequence->events, sequence->event_count, &table_addresses[0]);
-    start_feed(&shifter_feed, sequence->patterns, sequence->slot_count * sequence->pattern_words, &table_addresses[1]);
-    board_connect_pins();
+    for (uint32_t n = 0; n < 2; n++) pio_execute(guards[n], PIO_JMP | GUARD_ORIGIN);
+    REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
+    cycle_feed_start(&timeline_feed);
+    cycle_feed_start(&shifter_feed);
+    board_connect_pins(inverted_triggers(sequence));
     if (send_first_pattern()) return true;
     player_stop();
     return false;
@@ -106,18 +124,67 @@ void player_start(void) {
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(timeline.machine);
 }
 
-uint32_t player_take_events(void) {
-    const uint32_t events = PIO_IRQ(PIO0_BASE) & FLAGS_FOR_PROCESSOR;
-    PIO_IRQ(PIO0_BASE) = events;
-    return events;
+// Cycles that a feed has begun since `begun`. One that is behind the other reads as almost a whole ring ahead.
+static uint32_t new_cycles(const struct cycle_feed* feed) {
+    const uint32_t ahead = (cycle_feed_begun(feed) - begun) % CYCLE_FEED_RING;
+    return ahead < RING_USED ? ahead : 0;
+}
+
+// Follows the feeds, which count modulo their ring: to be called at least every RING_USED cycles.
+static void count_cycles(void) {
+    const uint32_t timeline_new = new_cycles(&timeline_feed), shifter_new = new_cycles(&shifter_feed);
+    begun += timeline_new > shifter_new ? timeline_new : shifter_new;
+}
+
+static bool feed_is_past(const struct cycle_feed* feed, uint32_t cycle) {
+    return (begun - cycle_feed_begun(feed)) % CYCLE_FEED_RING < begun - cycle;
+}
+
+bool player_swap(const struct sequence* following, uint32_t* after_cycles) {
+    count_cycles();
+    // The next cycle may begin this very moment; the one after it at least a cycle (10 us) later, when its entry, which
+    // is written first, is long there.
+    const uint32_t last = begun + 1;
+    *after_cycles = last + 1 - playing_from;
+    const uint32_t cycles = playing->header.cycles;
+    if (cycles != 0 && *after_cycles > cycles) return false;
+    cycle_feed_set(&timeline_feed, last, sequence_enter(playing) + 1, playing->cycle_words - 1);
+    cycle_feed_set(&timeline_feed, last + 1, sequence_enter(following), following->cycle_words + 1);
+    cycle_feed_set(&shifter_feed, last + 1, sequence_patterns(following), sequence_patterns_words(following));
+    next = following;
+    next_from = last + 1;
+    set_cycles(following, next_from + 1, next_from + RING_USED);
+    return true;
+}
+
+bool player_swapping(void) {
+    return next != NULL;
+}
+
+void player_poll(void) {
+    count_cycles();
+    if (next == NULL || begun - next_from > RING_USED || !feed_is_past(&timeline_feed, next_from) ||
+        !feed_is_past(&shifter_feed, next_from))
+        return;
+    // Both are in the new program: what is left in the ring of the old one is not to come round again.
+    set_cycles(next, next_from + RING_USED, next_from + CYCLE_FEED_RING + 1);
+    playing = next;
+    playing_from = next_from;
+    next = NULL;
+}
+
+uint32_t player_events(void) {
+    return PIO_IRQ(PIO0_BASE) & FLAGS_FOR_PROCESSOR;
 }
 
 void player_stop(void) {
     board_dark();
-    stop_feed(&timeline_feed);
-    stop_feed(&shifter_feed);
+    next = NULL;
+    cycle_feed_stop(&timeline_feed);
+    cycle_feed_stop(&shifter_feed);
     pio_stop(timeline, TIMELINE_SHIFT_CONTROL);
     pio_stop(shifter, SHIFTER_SHIFT_CONTROL);
+    for (uint32_t n = 0; n < 2; n++) pio_stop(guards[n], PIO_SHIFT_JOIN_TX);
     // The machines' output registers, too, so that connecting the pins again cannot light anything.
     pio_execute(timeline, PIO_MOV_PINS_NULL);
     pio_execute(shifter, PIO_MOV_PINS_NULL);

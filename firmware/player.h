@@ -22,8 +22,20 @@ bool player_arm(const struct sequence* sequence);
 // Starts the timeline: the first event plays within a few ticks.
 void player_start(void);
 
-// What happened since the last call, enum player_event bits.
-uint32_t player_take_events(void);
+// Goes on with `following` at the end of a cycle: the first that can be changed in time, which is the cycle after the
+// next one or, as some are in FIFOs already, one or two later. *after_cycles says how many of the playing sequence are
+// played by then. Both must have the same lead and polarities, and both stay as they are until player_swapping ends or
+// player_stop. False, and nothing changes, when the playing sequence ends before that.
+bool player_swap(const struct sequence* following, uint32_t* after_cycles);
+
+// True until the sequence before the swap is no longer needed.
+bool player_swapping(void);
+
+// Once each turn of the main loop, and at least every 2.4 ms while playing: 240 of the shortest cycles.
+void player_poll(void);
+
+// What has happened since player_arm, enum player_event bits.
+uint32_t player_events(void);
 
 // Dark, machines and DMA stopped. In any state.
 void player_stop(void);

@@ -80,11 +80,18 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 // GPIO control (2.19.6.1) and pads (2.19.6.3)
 #define GPIO_CTRL(pin) REGISTER(0x40014004 + 8 * (pin))
 #define PAD_GPIO(pin) REGISTER(0x4001c004 + 4 * (pin))
+#define GPIO_STATUS(pin) REGISTER(0x40014000 + 8 * (pin))
+#define GPIO_FROM_PAD (1u << 17)
+// Edges of inputs, eight pins a register, four bits each: write an edge's bit to clear it
+#define GPIO_INTR(pin) REGISTER(0x400140f0 + 4 * ((pin) / 8))
+#define GPIO_INTE(pin) REGISTER(0x40014100 + 4 * ((pin) / 8))  // of processor 0
+#define GPIO_EDGE_LOW(pin) (4u << 4 * ((pin) % 8))
 enum {
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
     GPIO_OUTPUT_INVERTED = 1 << 8,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
+    GPIO_INPUT_INVERTED = 1 << 16,
     PAD_SCHMITT = 1 << 1,
     PAD_PULL_DOWN = 1 << 2,
     PAD_PULL_UP = 1 << 3,
@@ -134,6 +141,7 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SHIFT_JOIN_TX (1u << 30)
 #define PIO_SHIFT_OUT_RIGHT (1u << 19)
 #define PIO_PINS_OUT(base, count) ((uint32_t)(count) << 20 | (uint32_t)(base))
+#define PIO_PINS_IN(base) ((uint32_t)(base) << 15)
 #define PIO_PINS_SIDE(base, count) ((uint32_t)(count) << 29 | (uint32_t)(base) << 10)
 // Instructions that the processor executes on a machine (3.4)
 enum {
@@ -155,6 +163,7 @@ enum {
 #define DMA_CHAN_ABORT REGISTER(0x50000444)
 #define DMA_CTRL_CHAIN_TO(channel) ((uint32_t)(channel) << 11)
 #define DMA_CTRL_PACE(request) ((uint32_t)(request) << 15)
+#define DMA_CTRL_READ_RING(bits) ((uint32_t)(bits) << 6)
 #define DMA_CTRL_WRITE_RING(bits) (1u << 10 | (uint32_t)(bits) << 6)
 enum {
     DMA_CTRL_ENABLE = 1 << 0,
@@ -216,6 +225,6 @@ enum {
 #define SCB_VTOR REGISTER(0xe000ed08)
 
 // Interrupts (2.3.2)
-enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_COUNT = 26 };
+enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_GPIO = 13, IRQ_COUNT = 26 };
 
 #endif

@@ -1,23 +1,50 @@
 // SPDX-License-Identifier: MIT
 // Sequence: validates a program and makes the words that pulse.pio plays.
 //
-// A slot is a stretch of latch, a stretch of light and trigger, and a dark stretch:
+// A cycle is a lead, and then for each slot a stretch of latch, a stretch of light, and a dark stretch:
 //
-//   LATCH    _|~|_______________________________
-//   LIGHT,TRIG  _|~~~~ exposure ~~~~|___________    rise to rise of the next slot: period_ticks, exactly
-//   chain    (this slot's pattern)  | next pattern being sent, from the rise on, and waited for at the end
+//   LATCH    ______|~|_______________________________
+//   LIGHT_EN ________|~~~~ exposure ~~~~|___________    light to light of the next slot: period_ticks, exactly
+//   TRIGn    _____|~~~~ width ~~~~|_________________    from the light on, or wherever its offset puts it
+//   chain         (this slot's pattern)  | next pattern being sent, from the light on, and waited for in the dark
 #include "sequence.h"
 
 #include <string.h>
 
+#include "events.h"
 #include "pulse.h"
 #include "text.h"
 
-enum {
-    OPERAND_MAX = (1 << 19) - 1,
-    SHORT_TICKS_MAX = OPERAND_MAX + TIMELINE_HOLD_TICKS,  // what every short op can play
-    SHORT_TICKS_KEPT = 64,  // long holds leave at least this for the short event that follows: above every op's cost
-};
+enum { CYCLE_END_TICKS = EVENTS_TICKS_MIN, KINDS_ALL = (1 << (OLS_DARK + 1)) - 1 };
+enum { SLOTS_A_STEP = 16 };
+_Static_assert((int)TIMELINE_ENTER_TICKS == (int)CYCLE_END_TICKS, "a program may begin where another would go on");
+
+const struct ols_slot* sequence_slots(const struct sequence* sequence) {
+    return (const struct ols_slot*)sequence->words;
+}
+
+const uint32_t* sequence_patterns(const struct sequence* sequence) {
+    return sequence->words + sequence->header.slot_count * sizeof(struct ols_slot) / 4;
+}
+
+uint32_t sequence_patterns_words(const struct sequence* sequence) {
+    return sequence->header.slot_count * (uint32_t)sequence->pattern_words;
+}
+
+const uint32_t* sequence_enter(const struct sequence* sequence) {
+    return sequence->words + sequence->header.program_bytes / 4;
+}
+
+uint32_t sequence_triggers(const struct sequence* sequence, const struct ols_slot* slot) {
+    uint32_t fires = 0;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++)
+        if (!(sequence->header.triggers[n].skip_kinds >> slot->kind & 1)) fires |= slot->trigger_mask & 1u << n;
+    return fires;
+}
+
+int32_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n) {
+    return slot->trigger_offset_ticks + sequence->header.triggers[n].offset_ticks;
+}
 
 uint16_t sequence_pattern_words(uint16_t chain_bits) {
     return (uint16_t)((chain_bits + 31) / 32);
@@ -31,57 +58,7 @@ uint32_t sequence_shift_ticks(const struct sequence_board* board) {
 }
 
 uint32_t sequence_slot_gap_ticks(void) {
-    return SEQUENCE_LATCH_TICKS + TIMELINE_SYNC_TICKS + TIMELINE_CYCLE_END_TICKS;
-}
-
-static uint32_t event_word(uint32_t pins, uint32_t op, uint32_t operand) {
-    return pins | op << 8 | operand << 13;
-}
-
-static void add_event(struct sequence* sequence, uint32_t pins, uint32_t op, uint32_t operand) {
-    if (sequence->event_count < SEQUENCE_EVENTS_MAX)
-        sequence->events[sequence->event_count] = event_word(pins, op, operand);
-    sequence->event_count++;  // goes on past the end, so that the caller sees what was needed
-}
-
-// Plays all of *ticks that no short event can, in long holds, and leaves the rest.
-static void add_long_holds(struct sequence* sequence, uint32_t pins, uint32_t* ticks) {
-    while (*ticks > SHORT_TICKS_MAX) {
-        uint32_t operand = (*ticks - SHORT_TICKS_KEPT - TIMELINE_LONG_HOLD_TICKS) / TIMELINE_LONG_HOLD_UNIT_TICKS;
-        if (operand > OPERAND_MAX) operand = OPERAND_MAX;
-        add_event(sequence, pins, TIMELINE_LONG_HOLD, operand);
-        *ticks -= operand * TIMELINE_LONG_HOLD_UNIT_TICKS + TIMELINE_LONG_HOLD_TICKS;
-    }
-}
-
-static void add_slot(struct sequence* sequence, const struct ols_slot* slot, bool first, bool last) {
-    const uint32_t sync_pin = first ? PIN_SYNC : 0;
-    const uint32_t light = slot->kind == OLS_DARK ? 0 : PIN_LIGHT_EN;
-    const uint32_t lit_pins = sync_pin | light | (uint32_t)slot->trigger_mask << PIN_TRIG_SHIFT;
-
-    add_event(sequence, sync_pin | PIN_LATCH, TIMELINE_HOLD, SEQUENCE_LATCH_TICKS - TIMELINE_HOLD_TICKS);
-
-    // A minimal shift comes first where long holds follow, so that sending starts with the light.
-    uint32_t lit_ticks = slot->exposure_ticks;
-    const bool long_exposure = lit_ticks > SHORT_TICKS_MAX;
-    const uint32_t shift_operand = long_exposure ? 0 : lit_ticks - TIMELINE_SHIFT_TICKS;
-    add_event(sequence, lit_pins, TIMELINE_SHIFT, shift_operand);
-    lit_ticks -= shift_operand + TIMELINE_SHIFT_TICKS;
-    if (long_exposure) {
-        add_long_holds(sequence, lit_pins, &lit_ticks);
-        add_event(sequence, lit_pins, TIMELINE_HOLD, lit_ticks - TIMELINE_HOLD_TICKS);
-    }
-
-    uint32_t dark_ticks = slot->period_ticks - slot->exposure_ticks - SEQUENCE_LATCH_TICKS;
-    if (last) dark_ticks -= TIMELINE_CYCLE_END_TICKS;
-    add_long_holds(sequence, sync_pin, &dark_ticks);
-    add_event(sequence, sync_pin, TIMELINE_SYNC, dark_ticks - TIMELINE_SYNC_TICKS);
-
-    // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
-    if (!last) return;
-    const bool endless = sequence->cycles == 0;
-    add_event(sequence, 0, endless ? TIMELINE_HOLD : TIMELINE_CYCLE_END,
-              endless ? TIMELINE_CYCLE_END_TICKS - TIMELINE_HOLD_TICKS : 0);
+    return SEQUENCE_LATCH_TICKS + EVENTS_TICKS_MIN + CYCLE_END_TICKS;
 }
 
 static bool reject(struct ols_error_reply* error, uint16_t slot, const char* reason, uint32_t figure,
@@ -108,26 +85,48 @@ static bool pattern_is_empty_from(const uint32_t* words, uint16_t word_count, ui
     return true;
 }
 
+static uint32_t lit_ticks_of(const struct ols_slot* slot) {
+    return slot->kind == OLS_DARK ? EVENTS_TICKS_MIN : slot->exposure_ticks;
+}
+
+// Ticks from the light on until nothing is left to do in a slot but to wait: it is lit, or the next pattern is being
+// sent in the dark.
+static uint32_t busy_ticks(const struct sequence_board* board, const struct ols_slot* slot) {
+    const uint32_t lit_ticks = lit_ticks_of(slot), shift_ticks = sequence_shift_ticks(board);
+    if (lit_ticks >= shift_ticks) return lit_ticks;
+    return lit_ticks + EVENTS_TICKS_MIN > shift_ticks ? lit_ticks + EVENTS_TICKS_MIN : shift_ticks;
+}
+
 static bool check_slot(const struct sequence_board* board, const struct ols_slot* slot, const uint32_t* pattern,
                        uint16_t number, struct ols_error_reply* error) {
     const uint16_t words = sequence_pattern_words(board->chain_bits);
     const uint32_t gap_ticks = sequence_slot_gap_ticks();
-    const uint32_t shortest_ticks = sequence_shift_ticks(board) + gap_ticks;
     if (slot->kind > OLS_DARK) return reject(error, number, "unknown kind ", slot->kind, "");
-    if (slot->trigger_mask > 15) return reject(error, number, "trigger mask ", slot->trigger_mask, ": 15 at most");
+    if (slot->trigger_mask >> OLS_TRIGGERS)
+        return reject(error, number, "trigger mask ", slot->trigger_mask, ": 15 at most");
     if (slot->reserved != 0) return reject(error, number, "reserved field is ", slot->reserved, ": send 0");
-    if (slot->trigger_offset_ticks != 0)
-        return reject(error, number, "this firmware cannot offset triggers (capabilities ", 0, "): send offset 0");
-    if (slot->exposure_ticks < TIMELINE_SHIFT_TICKS)
-        return reject(error, number, "exposure must be at least ", TIMELINE_SHIFT_TICKS, " ticks");
+    if (slot->exposure_ticks < EVENTS_TICKS_MIN)
+        return reject(error, number, "exposure must be at least ", EVENTS_TICKS_MIN, " ticks");
     if (slot->period_ticks < gap_ticks || slot->period_ticks - gap_ticks < slot->exposure_ticks)
         return reject(error, number, "period must exceed the exposure by at least ", gap_ticks, " ticks");
-    if (slot->period_ticks < shortest_ticks)
-        return reject(error, number, "period must be at least ", shortest_ticks, " ticks, to send the next pattern");
+    if (slot->period_ticks - gap_ticks < busy_ticks(board, slot))
+        return reject(error, number, "period must be at least ", busy_ticks(board, slot) + gap_ticks,
+                      " ticks, to send the next pattern");
     if (!pattern_is_empty_from(pattern, words, board->chain_bits))
         return reject(error, number, "the pattern has bits past the end of the chain of ", board->chain_bits, " bits");
     if (slot->kind == OLS_DARK && !pattern_is_empty_from(pattern, words, 0))
         return reject(error, number, "a dark slot must have an empty pattern of ", board->chain_bits, " zeros");
+    return true;
+}
+
+static bool check_triggers(const struct ols_load_begin* header, struct ols_error_reply* error) {
+    for (uint32_t n = 0; n < OLS_TRIGGERS; n++) {
+        const struct ols_trigger* const trigger = &header->triggers[n];
+        if (trigger->skip_kinds > KINDS_ALL || trigger->active_low > 1 || trigger->reserved != 0)
+            return reject(error, OLS_NO_SLOT, "trigger ", n, ": skip_kinds is 15 at most, active_low 1, reserved 0");
+        if (trigger->width_ticks != 0 && trigger->width_ticks < EVENTS_TICKS_MIN)
+            return reject(error, OLS_NO_SLOT, "trigger widths must be 0 or at least ", EVENTS_TICKS_MIN, " ticks");
+    }
     return true;
 }
 
@@ -138,38 +137,176 @@ static bool check_header(const struct sequence_board* board, const struct ols_lo
                       " bits: compile the program for that");
     if (header->slot_count < 1 || header->slot_count > OLS_SLOTS_MAX)
         return reject(error, OLS_NO_SLOT, "a program has 1 to ", OLS_SLOTS_MAX, " slots");
-    const uint32_t pattern_words = sequence_pattern_words(board->chain_bits);
-    if (header->slot_count * pattern_words > SEQUENCE_PATTERN_WORDS_MAX)
-        return reject(error, OLS_NO_SLOT, "this chain leaves room for ", SEQUENCE_PATTERN_WORDS_MAX / pattern_words,
-                      " slots: send fewer");
-    const uint32_t program_bytes = header->slot_count * (sizeof(struct ols_slot) + 4 * pattern_words);
+    if (header->cycles > OLS_CYCLES_MAX)
+        return reject(error, OLS_NO_SLOT, "a program counts ", OLS_CYCLES_MAX, " cycles at most: send 0 for endless");
+    const uint32_t pattern_bytes = 4u * sequence_pattern_words(board->chain_bits);
+    const uint32_t program_bytes = header->slot_count * (sizeof(struct ols_slot) + pattern_bytes);
     if (header->program_bytes != program_bytes)
         return reject(error, OLS_NO_SLOT, "a program of so many slots has ", program_bytes, " bytes");
+    if (program_bytes / 4 >= SEQUENCE_WORDS_MAX)
+        return reject(error, OLS_NO_SLOT, "the program is longer than the board's ", 4 * SEQUENCE_WORDS_MAX,
+                      " bytes: send fewer slots");
+    return check_triggers(header, error);
+}
+
+// The lead comes from the end of the last slot, where nothing but waiting is left.
+static bool check_lead(const struct sequence_board* board, const struct ols_load_begin* header,
+                       const struct ols_slot* last, struct ols_error_reply* error) {
+    const uint32_t lead_ticks_max = last->period_ticks - sequence_slot_gap_ticks() - busy_ticks(board, last);
+    if (header->lead_ticks != 0 && header->lead_ticks < EVENTS_TICKS_MIN)
+        return reject(error, OLS_NO_SLOT, "lead_ticks must be 0 or at least ", EVENTS_TICKS_MIN, "");
+    if (header->lead_ticks > lead_ticks_max)
+        return reject(error, (uint16_t)(header->slot_count - 1), "its dark end leaves room for lead_ticks of ",
+                      lead_ticks_max, ": end the cycle with a longer or a dark slot");
     return true;
 }
 
-bool sequence_compile(const struct sequence_board* board, const struct ols_load_begin* header, const uint8_t* program,
-                      struct sequence* sequence, struct ols_error_reply* error) {
-    sequence->slot_count = 0;
-    sequence->event_count = 0;
-    if (!check_header(board, header, error)) return false;
-    sequence->cycles = header->cycles;
-    sequence->pattern_words = sequence_pattern_words(board->chain_bits);
-    const uint32_t pattern_bytes = sequence->pattern_words * 4u;
-    for (uint16_t n = 0; n < header->slot_count; n++) {
-        struct ols_slot slot;
-        memcpy(&slot, program, sizeof slot);
-        // The chain starts with slot 0's pattern in it; what slot n sends is its successor's.
-        uint32_t* const pattern = sequence->patterns + n * sequence->pattern_words;
-        memcpy(pattern, program + sizeof slot, pattern_bytes);
-        program += sizeof slot + pattern_bytes;
-        if (!check_slot(board, &slot, pattern, n, error)) return false;
-        sequence->slots[n] = (struct sequence_slot){slot.period_ticks, slot.trigger_mask};
-        add_slot(sequence, &slot, n == 0, n + 1 == header->slot_count);
-        if (sequence->event_count > SEQUENCE_EVENTS_MAX)
-            return reject(error, n, "exposures and periods this long need more than the board's ", SEQUENCE_EVENTS_MAX,
-                          " events: send fewer slots");
+static void place_pulse(struct sequence_compiler* compiler, unsigned n, uint16_t number, struct events_pulse* pulse) {
+    const struct sequence* const sequence = compiler->sequence;
+    const struct ols_slot* const slot = &sequence_slots(sequence)[number];
+    struct sequence_trigger_place* const place = &compiler->triggers[n];
+    const int64_t rise_ticks = (int64_t)place->light_ticks + sequence_trigger_offset_ticks(sequence, slot, n);
+    const uint32_t width_ticks = sequence->header.triggers[n].width_ticks;
+    if (rise_ticks < 0) {
+        compiler->refused = !reject(compiler->error, number, "a trigger begins before the cycle: raise lead_ticks by ",
+                                    (uint32_t)-rise_ticks, " or more");
+    } else if ((uint64_t)rise_ticks < place->earliest_ticks) {
+        compiler->refused = !reject(compiler->error, number, "its pulse overlaps an earlier one of trigger ", n, "");
+    } else {
+        const uint64_t rise = (uint64_t)rise_ticks;
+        *pulse = (struct events_pulse){rise, rise + (width_ticks ? width_ticks : slot->exposure_ticks), number};
+        place->earliest_ticks = pulse->fall_ticks + EVENTS_TICKS_MIN;
     }
-    sequence->slot_count = header->slot_count;
+}
+
+static void next_pulse(void* context, unsigned n, struct events_pulse* pulse) {
+    struct sequence_compiler* const compiler = context;
+    const struct sequence* const sequence = compiler->sequence;
+    struct sequence_trigger_place* const place = &compiler->triggers[n];
+    *pulse = (struct events_pulse){EVENTS_NEVER, EVENTS_NEVER, 0};
+    for (bool found = false; !found && place->next_slot < sequence->header.slot_count; place->next_slot++) {
+        const struct ols_slot* const slot = &sequence_slots(sequence)[place->next_slot];
+        found = sequence_triggers(sequence, slot) >> n & 1;
+        if (found) place_pulse(compiler, n, (uint16_t)place->next_slot, pulse);
+        place->light_ticks += slot->period_ticks;
+    }
+}
+
+// Stretches of the light. What the last slot's dark ends with is the lead of the next cycle and the cycle's end.
+static void play_slot(struct sequence_compiler* compiler, const struct ols_slot* slot, uint32_t number) {
+    struct events* const events = &compiler->events;
+    const struct ols_load_begin* const header = &compiler->sequence->header;
+    const uint32_t sync_pin = number == 0 ? PIN_SYNC : 0;
+    const uint32_t light_pin = slot->kind == OLS_DARK ? 0 : PIN_LIGHT_EN;
+    const uint32_t lit_ticks = lit_ticks_of(slot);
+    const uint32_t sending_ticks = busy_ticks(compiler->board, slot) - lit_ticks;
+    uint32_t rest_ticks = slot->period_ticks - SEQUENCE_LATCH_TICKS - lit_ticks - sending_ticks;
+    if (number + 1 == header->slot_count) rest_ticks -= header->lead_ticks + CYCLE_END_TICKS;
+
+    events_play(events, sync_pin | PIN_LATCH, TIMELINE_HOLD, SEQUENCE_LATCH_TICKS);
+    events_play(events, sync_pin | light_pin, TIMELINE_SHIFT, lit_ticks);
+    if (sending_ticks > 0) events_play(events, sync_pin, TIMELINE_HOLD, sending_ticks);
+    events_play(events, sync_pin, TIMELINE_SYNC, rest_ticks);
+}
+
+static bool reject_limit(struct ols_error_reply* error, uint16_t slot, const char* reason, uint32_t figure,
+                         const char* remedy) {
+    reject(error, slot, reason, figure, remedy);
+    error->code = OLS_ERROR_OVER_LIMIT;
+    return false;
+}
+
+static bool add_light(struct sequence_compiler* compiler, const struct ols_slot* slot, const uint32_t* pattern,
+                      uint16_t number) {
+    const uint32_t lamps_max = compiler->board->limits.lamps_lit_max;
+    const uint32_t lamps = light_add(&compiler->use, pattern, compiler->sequence->pattern_words, slot->exposure_ticks);
+    if (lamps > lamps_max)
+        return reject_limit(compiler->error, number, "this board's supply lights ", lamps_max, " lamps at once");
     return true;
+}
+
+static bool check_duty(const struct sequence_compiler* compiler) {
+    const uint32_t permille_max = compiler->board->limits.lamp_duty_max_permille;
+    uint32_t lamp;
+    const uint64_t lit_ticks = light_longest_ticks(&compiler->use, &lamp);
+    if (lit_ticks * 1000 > compiler->events.now_ticks * permille_max)
+        return reject_limit(compiler->error, OLS_NO_SLOT,
+                            "a lamp is lit for more of the cycle than its limit; chain bit ", lamp,
+                            ": make the exposures shorter");
+    return true;
+}
+
+static bool events_are_fine(struct sequence_compiler* compiler, uint16_t number) {
+    const struct events* const events = &compiler->events;
+    switch (events->problem) {
+        case EVENTS_TOO_MANY:
+            return reject(compiler->error, number, "program and events need more than the board's ",
+                          4 * SEQUENCE_WORDS_MAX, " bytes: send fewer slots");
+        case EVENTS_TOO_CLOSE:
+            return reject(compiler->error, events->last_slot,
+                          "an edge of a trigger must coincide with any other edge or be ", EVENTS_TICKS_MIN,
+                          " ticks away");
+        default: return true;
+    }
+}
+
+void sequence_begin(struct sequence_compiler* compiler, const struct sequence_board* board, struct sequence* sequence) {
+    *compiler = (struct sequence_compiler){.board = board, .sequence = sequence};
+    sequence->pattern_words = sequence_pattern_words(board->chain_bits);
+    sequence->cycle_words = 0;
+}
+
+// Everything about the cycle as a whole; then its lead.
+static bool begin_cycle(struct sequence_compiler* compiler) {
+    struct sequence* const sequence = compiler->sequence;
+    const struct ols_load_begin* const header = &sequence->header;
+    if (!check_header(compiler->board, header, compiler->error)) return false;
+    // The last slot first: the lead is a part of it.
+    const uint16_t last = (uint16_t)(header->slot_count - 1);
+    const struct ols_slot* const slot = &sequence_slots(sequence)[last];
+    const uint32_t* const pattern = sequence_patterns(sequence) + last * (uint32_t)sequence->pattern_words;
+    if (!check_slot(compiler->board, slot, pattern, last, compiler->error)) return false;
+    if (!check_lead(compiler->board, header, slot, compiler->error)) return false;
+
+    uint32_t* const enter = sequence->words + header->program_bytes / 4;
+    *enter = TIMELINE_ENTER << 8 | (header->cycles - 1) << 13;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++)
+        compiler->triggers[n].light_ticks = (uint64_t)header->lead_ticks + SEQUENCE_LATCH_TICKS;
+    const uint32_t words_max = SEQUENCE_WORDS_MAX - header->program_bytes / 4 - 1;
+    events_begin(&compiler->events, enter + 1, words_max, next_pulse, compiler);
+    if (header->lead_ticks > 0) events_play(&compiler->events, 0, TIMELINE_HOLD, header->lead_ticks);
+    return !compiler->refused;
+}
+
+static bool end_cycle(struct sequence_compiler* compiler) {
+    struct events* const events = &compiler->events;
+    const struct ols_load_begin* const header = &compiler->sequence->header;
+    for (unsigned n = 0; n < OLS_TRIGGERS; n++)
+        if (events->pulses[n].fall_ticks > events->now_ticks && events->pulses[n].fall_ticks != EVENTS_NEVER)
+            return reject(compiler->error, events->pulses[n].slot, "its pulse of trigger ", n,
+                          " ends after the cycle: end the cycle with a longer slot");
+    // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
+    events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, CYCLE_END_TICKS);
+    compiler->sequence->cycle_words = events->word_count;
+    return events_are_fine(compiler, (uint16_t)(header->slot_count - 1)) && check_duty(compiler);
+}
+
+static bool add_slot(struct sequence_compiler* compiler) {
+    const struct sequence* const sequence = compiler->sequence;
+    const uint16_t number = (uint16_t)compiler->next_slot++;
+    const struct ols_slot* const slot = &sequence_slots(sequence)[number];
+    const uint32_t* const pattern = sequence_patterns(sequence) + number * (uint32_t)sequence->pattern_words;
+    if (!check_slot(compiler->board, slot, pattern, number, compiler->error)) return false;
+    if (!add_light(compiler, slot, pattern, number)) return false;
+    play_slot(compiler, slot, number);
+    return !compiler->refused && events_are_fine(compiler, number);
+}
+
+enum sequence_progress sequence_step(struct sequence_compiler* compiler, struct ols_error_reply* error) {
+    compiler->error = error;
+    if (compiler->next_slot == 0 && !begin_cycle(compiler)) return SEQUENCE_REFUSED;
+    for (int n = 0; n < SLOTS_A_STEP && compiler->next_slot < compiler->sequence->header.slot_count; n++)
+        if (!add_slot(compiler)) return SEQUENCE_REFUSED;
+    if (compiler->next_slot < compiler->sequence->header.slot_count) return SEQUENCE_UNFINISHED;
+    return end_cycle(compiler) ? SEQUENCE_MADE : SEQUENCE_REFUSED;
 }

@@ -8,6 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "events.h"
+#include "light_limits.h"
 #include "wire.h"
 
 #ifdef __cplusplus
@@ -18,35 +20,35 @@ extern "C" {
 struct sequence_board {
     uint16_t chain_bits;     // 1..OLS_CHAIN_BITS_MAX
     uint16_t shift_divider;  // of the shifter's clock
-};
-
-// A timeline event's pins, bit 0 at the first of the timeline's eight.
-enum sequence_pins {
-    PIN_LATCH = 1 << 0,
-    PIN_LIGHT_EN = 1 << 1,
-    PIN_TRIG_SHIFT = 2,  // TRIGn is bit n above this
-    PIN_SYNC = 1 << 6
+    struct light_limits limits;
 };
 
 enum {
-    SEQUENCE_LATCH_TICKS = 12,  // 96 ns; TLC5926 asks for 20 ns
-    SEQUENCE_EVENTS_MAX = 4 * OLS_SLOTS_MAX,
-    SEQUENCE_PATTERN_WORDS_MAX = 6 * OLS_SLOTS_MAX
+    SEQUENCE_LATCH_TICKS = 12,   // 96 ns; TLC5926 asks for 20 ns
+    SEQUENCE_WORDS_MAX = 24320,  // 95 KB, twice: 1024 slots with four triggers of their own
 };
 
-// One cycle. Player feeds both tables round and round; the pattern of slot n is sent while slot n - 1 plays.
+// One program. Player feeds patterns and cycle words round and round; the pattern of slot n is sent while slot n - 1
+// plays.
 struct sequence {
-    uint32_t cycles;  // 0: until stopped
-    uint16_t slot_count;
-    uint16_t pattern_words;  // of one slot
-    uint32_t event_count;
-    uint32_t events[SEQUENCE_EVENTS_MAX];
-    uint32_t patterns[SEQUENCE_PATTERN_WORDS_MAX];
-    struct sequence_slot {
-        uint32_t period_ticks;
-        uint32_t trigger_mask;
-    } slots[OLS_SLOTS_MAX];  // what the trigger log measures against
+    struct ols_load_begin header;
+    uint16_t pattern_words;  // of one pattern
+    uint32_t cycle_words;    // of the timeline, in one cycle; 0 until they are made
+    // First header.program_bytes as they were loaded, slots and patterns; then the word that enters this program, in
+    // place of the last one of the program before; then those of a cycle.
+    uint32_t words[SEQUENCE_WORDS_MAX];
 };
+
+const struct ols_slot* sequence_slots(const struct sequence* sequence);
+const uint32_t* sequence_patterns(const struct sequence* sequence);
+uint32_t sequence_patterns_words(const struct sequence* sequence);  // of all slots
+const uint32_t* sequence_enter(const struct sequence* sequence);    // the cycle's words follow
+
+// The triggers that fire in a slot, by its mask and its kind. Bit n: TRIGn.
+uint32_t sequence_triggers(const struct sequence* sequence, const struct ols_slot* slot);
+
+// Ticks from a slot's light to the rise of trigger n.
+int32_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n);
 
 // Words of a pattern, padded to whole ones.
 uint16_t sequence_pattern_words(uint16_t chain_bits);
@@ -58,11 +60,30 @@ uint32_t sequence_shift_ticks(const struct sequence_board* board);
 // Ticks of a period that cannot be exposure: latching, and the cost of the events.
 uint32_t sequence_slot_gap_ticks(void);
 
-// Checks the program (layout: wire.h, ols_load_begin) and makes its words. `program` holds header->program_bytes bytes.
-// False with `error` filled in (OLS_ERROR_BAD_PROGRAM) when it cannot be played exactly as it says; `sequence` is then
-// empty.
-bool sequence_compile(const struct sequence_board* board, const struct ols_load_begin* header, const uint8_t* program,
-                      struct sequence* sequence, struct ols_error_reply* error);
+// The making of a sequence from the program in it, some slots at a time: a long one takes several milliseconds.
+struct sequence_compiler {
+    const struct sequence_board* board;
+    struct sequence* sequence;
+    struct ols_error_reply* error;  // of the step that is under way
+    uint32_t next_slot;
+    struct events events;
+    struct light_use use;
+    struct sequence_trigger_place {
+        uint32_t next_slot;
+        uint64_t light_ticks;     // of next_slot, since the cycle's begin
+        uint64_t earliest_ticks;  // at which the next pulse may rise
+    } triggers[OLS_TRIGGERS];
+    bool refused;
+};
+
+enum sequence_progress { SEQUENCE_UNFINISHED, SEQUENCE_MADE, SEQUENCE_REFUSED };
+
+// Begins with the program that `sequence` holds (header, and words as loaded).
+void sequence_begin(struct sequence_compiler* compiler, const struct sequence_board* board, struct sequence* sequence);
+
+// SEQUENCE_REFUSED, with `error` filled in: the program cannot be played exactly as it says (OLS_ERROR_BAD_PROGRAM), or
+// lights more than lamps or supply stand (OLS_ERROR_OVER_LIMIT).
+enum sequence_progress sequence_step(struct sequence_compiler* compiler, struct ols_error_reply* error);
 
 #ifdef __cplusplus
 }

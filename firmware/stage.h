@@ -12,18 +12,25 @@
 // Idle, or fault when the previous run ended in one.
 void stage_init(void);
 
-// Once each turn of the main loop: follows what player and witness saw. `host_is_there` says whether anybody could stop
-// the light.
+// Once each turn of the main loop: follows what player, witness and the stop inputs saw. `host_is_there` says whether
+// anybody could stop the light.
 void stage_poll(bool host_is_there);
 
-// Commands. False with `error` filled in when refused; nothing has changed then, except that a program whose loading
-// failed is gone.
+// The answer to a command that may take more than a turn of the main loop: while it is busy, ask again in the next one.
+enum stage_answer { STAGE_OK, STAGE_REFUSED, STAGE_BUSY };
+
+// To be called before a command, or anything else that the host asks, is answered for the first time: a sign of life.
+void stage_begin_request(void);
+
+// Commands. False, or STAGE_REFUSED, with `error` filled in when refused; nothing has changed then, except that a program
+// whose loading failed is gone.
 bool stage_load_begin(const struct ols_load_begin* header, struct ols_error_reply* error);
 bool stage_load_chunk(uint32_t offset_bytes, const uint8_t* data, size_t data_bytes, struct ols_error_reply* error);
-bool stage_load_end(struct ols_error_reply* error);
-bool stage_arm(struct ols_error_reply* error);
+enum stage_answer stage_load_end(struct ols_error_reply* error);
+enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* error);
 bool stage_start(struct ols_error_reply* error);
 bool stage_stop(struct ols_error_reply* error);
+enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_reply* error);
 bool stage_clear_fault(struct ols_error_reply* error);
 
 void stage_status(struct ols_status_reply* status);

@@ -45,5 +45,7 @@ __attribute__((aligned(256))) const vector vectors[16 + IRQ_COUNT] = {
     [16 + IRQ_USBCTRL] = {.handler = board_wake_interrupt},
     [17 + IRQ_USBCTRL... 15 + IRQ_PIO0_0] = {.handler = unexpected_exception},
     [16 + IRQ_PIO0_0] = {.handler = board_wake_interrupt},
-    [17 + IRQ_PIO0_0... 15 + IRQ_COUNT] = {.handler = unexpected_exception},
+    [17 + IRQ_PIO0_0... 15 + IRQ_GPIO] = {.handler = unexpected_exception},
+    [16 + IRQ_GPIO] = {.handler = board_wake_interrupt},
+    [17 + IRQ_GPIO... 15 + IRQ_COUNT] = {.handler = unexpected_exception},
 };

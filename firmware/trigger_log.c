@@ -13,37 +13,67 @@ enum {
     WATCHED_TRIGGER = 1 << 0  // TRIG0
 };
 
-static struct ols_trigger_log_entry entries[LOG_ENTRIES];
+// An entry as it is kept: its counter follows from its place.
+struct kept {
+    uint64_t rise_ticks;
+    uint32_t cycle;
+    uint16_t slot;
+    uint8_t trigger_mask, program;
+};
+
+static struct kept entries[LOG_ENTRIES];
 static const struct sequence* played;
+static const struct sequence* next_played;  // from cycle swap_cycle of `played` on; null when no swap is due
+static uint32_t swap_cycle;
+static uint8_t program;
 static uint32_t oldest;   // counter of the first entry kept
 static uint32_t fired;    // counter that the next trigger gets
 static uint32_t read_to;  // counter after the last entry the host has read
 static uint32_t lost;
 static uint32_t next_slot;        // where the search for the next trigger's slot begins
 static uint32_t cycle;            // of next_slot
-static uint64_t scheduled_ticks;  // rise of next_slot since the rise of slot 0 of cycle 0
-static struct ols_trigger_log_entry last;
+static uint64_t scheduled_ticks;  // light of next_slot since the light of slot 0 of cycle 0
+static struct kept last;
 static int64_t first_error_ticks;  // measured minus scheduled of the first trigger: where start is on the schedule
 
 void trigger_log_begin(const struct sequence* sequence) {
     played = sequence;
-    oldest = fired = read_to = lost = next_slot = cycle = 0;
+    next_played = NULL;
+    oldest = fired = read_to = lost = next_slot = cycle = program = 0;
     scheduled_ticks = 0;
-    last = (struct ols_trigger_log_entry){.slot = OLS_NO_SLOT};
+    last = (struct kept){.slot = OLS_NO_SLOT};
+}
+
+void trigger_log_swap(const struct sequence* next, uint32_t after_cycles) {
+    next_played = next;
+    swap_cycle = after_cycles;
 }
 
 static void step_slot(void) {
-    scheduled_ticks += played->slots[next_slot].period_ticks;
-    if (++next_slot < played->slot_count) return;
+    scheduled_ticks += sequence_slots(played)[next_slot].period_ticks;
+    if (++next_slot < played->header.slot_count) return;
     next_slot = 0;
-    cycle++;
+    if (++cycle != swap_cycle || next_played == NULL) return;
+    played = next_played;
+    next_played = NULL;
+    cycle = 0;
+    program++;
 }
 
-// Makes next_slot the next slot that fires the watched trigger; false when none of the cycle does.
+static uint32_t triggers_of_next_slot(void) {
+    return sequence_triggers(played, &sequence_slots(played)[next_slot]);
+}
+
+// Makes next_slot the next slot that fires the watched trigger; false when none of the cycle does, nor any of the
+// programs' that follow it.
 static bool find_slot(void) {
-    for (uint32_t tried = 0; tried < played->slot_count; tried++) {
-        if (played->slots[next_slot].trigger_mask & WATCHED_TRIGGER) return true;
+    const struct sequence* tried = played;
+    for (uint32_t left = played->header.slot_count; left > 0 || next_played != NULL; left -= left > 0) {
+        if (triggers_of_next_slot() & WATCHED_TRIGGER) return true;
         step_slot();
+        if (tried == played) continue;
+        tried = played;
+        left = played->header.slot_count + 1;
     }
     return false;
 }
@@ -60,13 +90,14 @@ static uint64_t rise_from_stamp(uint32_t stamp, uint64_t now_ticks) {
 bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
     if (!find_slot()) return false;
     if (fired - oldest == LOG_ENTRIES && oldest++ >= read_to) lost++;
-    last = (struct ols_trigger_log_entry){.rise_ticks = rise_from_stamp(stamp, now_ticks),
-                                          .counter = fired,
-                                          .cycle = cycle,
-                                          .slot = (uint16_t)next_slot,
-                                          .trigger_mask = (uint16_t)played->slots[next_slot].trigger_mask};
+    last = (struct kept){.rise_ticks = rise_from_stamp(stamp, now_ticks),
+                         .cycle = cycle,
+                         .slot = (uint16_t)next_slot,
+                         .trigger_mask = (uint8_t)triggers_of_next_slot(),
+                         .program = program};
     entries[fired % LOG_ENTRIES] = last;
-    const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks;
+    const int64_t offset_ticks = sequence_trigger_offset_ticks(played, &sequence_slots(played)[next_slot], 0);
+    const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks - offset_ticks;
     if (fired == 0) first_error_ticks = error_ticks;
     fired++;
     step_slot();
@@ -90,7 +121,15 @@ void trigger_log_read(uint32_t first, uint16_t entries_max, struct ols_trigger_l
     if (first > fired) first = fired;
     uint32_t count = fired - first;
     if (count > entries_max) count = entries_max;
-    for (uint32_t i = 0; i < count; i++) out[i] = entries[(first + i) % LOG_ENTRIES];
+    for (uint32_t i = 0; i < count; i++) {
+        const struct kept* const kept = &entries[(first + i) % LOG_ENTRIES];
+        out[i] = (struct ols_trigger_log_entry){.rise_ticks = kept->rise_ticks,
+                                                .counter = first + i,
+                                                .cycle = kept->cycle,
+                                                .slot = kept->slot,
+                                                .trigger_mask = kept->trigger_mask,
+                                                .program = kept->program};
+    }
     if (first + count > read_to) read_to = first + count;
     *header = (struct ols_trigger_log_reply){
         .first_counter = first, .next_counter = fired, .entries_lost = lost, .entry_count = (uint16_t)count};

@@ -13,17 +13,24 @@ SIZES = {'char': 1, 'uint8_t': 1, 'int8_t': 1, 'uint16_t': 2, 'int16_t': 2, 'uin
          'int64_t': 8}
 
 
-def struct_lines(name, body):
+def fields(name, structs):
+    """(type, field, count, bytes of all) of a packed struct, whose members may be structs of the same header."""
+    for declaration in filter(None, (part.strip() for part in structs[name].split(';'))):
+        match = re.fullmatch(r'(?:struct\s+)?(\w+)\s+(\w+)(?:\s*\[\s*(\d+)\s*\])?', declaration)
+        if not match or match[1] not in SIZES and match[1] not in structs:
+            raise SystemExit(f'struct {name}: cannot read the field "{declaration}": use a fixed-size integer or char')
+        count = int(match[3] or 1)
+        one = SIZES.get(match[1]) or sum(size for *_, size in fields(match[1], structs))
+        yield match[1], match[2], count, one * count
+
+
+def struct_lines(name, structs):
     """The fields of a packed struct, one line each, with their byte offsets; then its size."""
     offset = 0
     lines = []
-    for declaration in filter(None, (part.strip() for part in body.split(';'))):
-        match = re.fullmatch(r'(\w+)\s+(\w+)(?:\s*\[\s*(\d+)\s*\])?', declaration)
-        if not match or match[1] not in SIZES:
-            raise SystemExit(f'struct {name}: cannot read the field "{declaration}": use a fixed-size integer or char')
-        count = int(match[3] or 1)
-        lines.append(f'struct {name} {offset:4d} {match[1]} {match[2]}[{count}]')
-        offset += SIZES[match[1]] * count
+    for kind, field, count, size in fields(name, structs):
+        lines.append(f'struct {name} {offset:4d} {kind} {field}[{count}]')
+        offset += size
     return lines + [f'struct {name} {offset:4d} end']
 
 
@@ -42,8 +49,9 @@ def layout(source):
     source = re.sub(r'//[^\n]*|/\*.*?\*/', ' ', source, flags=re.S)
     lines = [f'constant {name} = {int(value, 0)}'
              for name, value in re.findall(r'^#define\s+(\w+)\s+(0[xX][0-9a-fA-F]+|\d+)\s*$', source, re.M)]
-    for name, body in re.findall(r'\bstruct\s+(\w+)\s*\{(.*?)\}', source, re.S):
-        lines += struct_lines(name, body)
+    structs = dict(re.findall(r'\bstruct\s+(\w+)\s*\{(.*?)\}', source, re.S))
+    for name in structs:
+        lines += struct_lines(name, structs)
     for name, body in re.findall(r'\benum\s+(\w+)\s*\{(.*?)\}', source, re.S):
         lines += enum_lines(name, body)
     return sorted(lines)

@@ -13,12 +13,16 @@
 #endif
 // The attribute and not the pragma: with it, the compiler refuses references to members that may be misaligned.
 #define OLS_PACKED __attribute__((packed))
+// For what the board keeps in memory as it came: whole words, which it may then read as words.
+#define OLS_PACKED_WORDS __attribute__((packed, aligned(4)))
 
 OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-endian, and so must be its users");
 
 #define OLS_FRAME_SYNC 0x534c       // bytes 4c 53, "LS"
 #define OLS_PAYLOAD_BYTES_MAX 1024  // of one frame
 #define OLS_SLOTS_MAX 1024          // of one program
+#define OLS_TRIGGERS 4              // TRIG0 to TRIG3
+#define OLS_CYCLES_MAX 524288       // of one program, when counted
 #define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
 #define OLS_LOG_ENTRIES_MAX 48      // of one reply
 #define OLS_NO_SLOT 0xffff          // where no slot is to blame
@@ -38,15 +42,16 @@ struct ols_frame_header {
 // Requests. Without a struct below, a request or reply has no payload.
 enum ols_message {
     OLS_HELLO = 0x01,             // -> ols_hello_reply, in any state
-    OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed or playing
+    OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed; while playing, the next program is loaded
     OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
-    OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded
-    OLS_ARM = 0x05,               // loaded or done -> armed: first pattern shifted, everything ready
+    OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
+    OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
     OLS_START = 0x06,             // armed -> playing
     OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
     OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
     OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
     OLS_CLEAR_FAULT = 0x0a,       // fault -> idle; the program must be loaded again
+    OLS_SWAP = 0x0b,              // playing with a next program ready -> ols_swap_reply; goes on with that
     OLS_ERROR = 0x7f              // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
 };
 
@@ -56,7 +61,8 @@ struct ols_hello {
 } OLS_PACKED;
 
 enum ols_capability {
-    OLS_CAN_OFFSET_TRIGGERS = 1  // trigger_offset_ticks may differ from 0
+    OLS_CAN_OFFSET_TRIGGERS = 1,  // triggers may have offsets, widths and polarities of their own
+    OLS_CAN_SWAP = 2              // the next program can be loaded while one plays
 };
 
 struct ols_hello_reply {
@@ -68,18 +74,32 @@ struct ols_hello_reply {
     uint32_t capabilities;  // enum ols_capability bits
     uint16_t chain_bits;    // of this board's shift chain
     uint16_t slots_max;
-    uint32_t shift_ticks;     // to send one pattern
-    uint32_t slot_gap_ticks;  // period_ticks - exposure_ticks must be at least this
+    uint32_t shift_ticks;             // to send one pattern
+    uint32_t slot_gap_ticks;          // period_ticks - exposure_ticks must be at least this
+    uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
+    uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
 } OLS_PACKED;
 
-// The program follows in chunks: slot_count times an ols_slot and its ceil(chain_bits / 32) pattern words.
+// One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
+struct ols_trigger {
+    int32_t offset_ticks;  // of its rise, added to each slot's own; before the light when negative
+    uint32_t width_ticks;  // 0: the slot's exposure
+    uint8_t skip_kinds;    // bit k: does not fire in slots of kind k
+    uint8_t active_low;    // 1: the pin idles high and is low while the camera is to expose
+    uint16_t reserved;     // 0
+} OLS_PACKED_WORDS;
+
+// The program follows in chunks: slot_count times an ols_slot, then the patterns of all slots in the same order,
+// ceil(chain_bits / 32) words each.
 struct ols_load_begin {
     uint16_t slot_count;  // 1..OLS_SLOTS_MAX
     uint16_t chain_bits;  // must be the board's
-    uint32_t cycles;      // 0: until stopped
+    uint32_t cycles;      // OLS_CYCLES_MAX at most, 0: until stopped
     uint32_t program_bytes;
     uint32_t program_crc32;
-} OLS_PACKED;
+    uint32_t lead_ticks;  // dark before a cycle's first latch, taken from its last slot: room for early triggers
+    struct ols_trigger triggers[4];  // OLS_TRIGGERS
+} OLS_PACKED_WORDS;
 
 struct ols_load_chunk {
     uint32_t offset_bytes;  // of the data that follow, in the program
@@ -97,9 +117,15 @@ struct ols_slot {
     uint8_t kind;                  // enum ols_slot_kind
     uint8_t trigger_mask;          // bit n: TRIGn
     uint16_t reserved;             // 0
-    uint32_t exposure_ticks;       // of trigger and light
-    uint32_t period_ticks;         // trigger rise to the next slot's trigger rise
-    int32_t trigger_offset_ticks;  // 0 without OLS_CAN_OFFSET_TRIGGERS
+    uint32_t exposure_ticks;       // of the light
+    uint32_t period_ticks;         // from this slot's light to the next slot's
+    int32_t trigger_offset_ticks;  // from the light to the triggers, before it when negative
+} OLS_PACKED_WORDS;
+
+#define OLS_HEARTBEAT_TICKS_MIN 625000  // 5 ms: the board looks every millisecond or two
+
+struct ols_arm {
+    uint32_t heartbeat_ticks;  // without a message for longer than this, armed or playing, is a fault; 0: never
 } OLS_PACKED;
 
 enum ols_state {
@@ -111,6 +137,21 @@ enum ols_state {
     OLS_STATE_FAULT = 5  // dark until OLS_CLEAR_FAULT
 };
 
+// The program that is to follow the playing one.
+enum ols_next {
+    OLS_NEXT_NONE = 0,
+    OLS_NEXT_LOADING = 1,
+    OLS_NEXT_READY = 2,    // OLS_SWAP makes it follow; so does the next arm, when play has ended
+    OLS_NEXT_SWAPPING = 3  // it will follow at the end of a cycle; nothing can be loaded until then
+};
+
+// Program and cycle at which a swap takes place.
+struct ols_swap_reply {
+    uint32_t after_cycles;  // of the playing program, since it began
+    uint8_t program;        // number of the new one in log entries: programs swapped in since start, modulo 256
+    uint8_t reserved[3];
+} OLS_PACKED;
+
 enum ols_fault {
     OLS_FAULT_NONE = 0,
     OLS_FAULT_TIMELINE_STARVED = 1,  // the next event was not there in time
@@ -119,7 +160,11 @@ enum ols_fault {
     OLS_FAULT_HOST_LOST = 4,         // the bus was reset, suspended or unplugged while armed or playing
     OLS_FAULT_WATCHDOG = 5,          // the processor hung and was reset
     OLS_FAULT_PROCESSOR = 6,         // hard fault or unexpected interrupt
-    OLS_FAULT_BAD_MEMORY = 7         // the program in memory no longer has its CRC
+    OLS_FAULT_BAD_MEMORY = 7,        // the program in memory no longer has its CRC
+    OLS_FAULT_EMERGENCY_STOP = 8,    // the emergency stop was pressed, or its wire is open
+    OLS_FAULT_OVER_TEMPERATURE = 9,  // said a lamp driver
+    OLS_FAULT_OPEN_LAMP = 10,        // said a lamp driver
+    OLS_FAULT_HEARTBEAT = 11         // no message from the host for the time chosen when arming
 };
 
 struct ols_status_reply {
@@ -133,6 +178,8 @@ struct ols_status_reply {
     uint32_t cycles_played;
     uint32_t log_entries_lost;
     uint32_t program_crc32;  // of the loaded program, 0 without
+    uint8_t next;            // enum ols_next
+    uint8_t reserved[3];
 } OLS_PACKED;
 
 struct ols_read_trigger_log {
@@ -153,9 +200,10 @@ struct ols_trigger_log_reply {
 struct ols_trigger_log_entry {
     uint64_t rise_ticks;  // since start, even: measured every second tick
     uint32_t counter;     // 0 for the first trigger after start
-    uint32_t cycle;
+    uint32_t cycle;       // of its program
     uint16_t slot;
-    uint16_t trigger_mask;
+    uint8_t trigger_mask;
+    uint8_t program;  // how many programs have been swapped in since start, modulo 256
 } OLS_PACKED;
 
 enum ols_error_code {
@@ -165,7 +213,9 @@ enum ols_error_code {
     OLS_ERROR_BAD_OFFSET = 4,
     OLS_ERROR_BAD_CRC = 5,
     OLS_ERROR_BAD_PROGRAM = 6,
-    OLS_ERROR_FAULT_LATCHED = 7
+    OLS_ERROR_FAULT_LATCHED = 7,
+    OLS_ERROR_OVER_LIMIT = 8,  // a lamp would be lit for too long, or too many at once
+    OLS_ERROR_NOT_SAFE = 9     // the emergency stop or a driver says no
 };
 
 struct ols_error_reply {
@@ -176,11 +226,14 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 64, "hello reply");
-OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 16, "load begin");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 68, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
+OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
-OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 40, "status reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 4, "arm");
+OLS_WIRE_ASSERT(sizeof(struct ols_swap_reply) == 8, "swap reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 44, "status reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) == 16, "trigger log reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_entry) == 20, "trigger log entry");

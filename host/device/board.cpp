@@ -57,6 +57,16 @@ std::string fault_text(const ols_status_reply& status) {
         case OLS_FAULT_BAD_MEMORY:
             text = "bad_memory: the program in memory changed; load it again, and check the power supply";
             break;
+        case OLS_FAULT_EMERGENCY_STOP:
+            text = "emergency_stop: the button was pressed or its wire is open; release it when the stage is safe";
+            break;
+        case OLS_FAULT_OVER_TEMPERATURE:
+            text = "over_temperature: a lamp driver is too hot; let it cool, and check the exposures";
+            break;
+        case OLS_FAULT_OPEN_LAMP: text = "open_lamp: a lamp driver found no lamp; check lamps and wiring"; break;
+        case OLS_FAULT_HEARTBEAT:
+            text = "heartbeat: the host was silent for too long; check its load, or arm with a longer time";
+            break;
     }
     const std::string slot =
         status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
@@ -145,8 +155,12 @@ Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
 }
 
 Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
-    const ols_load_begin begin{slot_count, chain_bits, cycles, uint32_t(program.size()),
-                               ols_crc32(0, program.data(), program.size())};
+    ols_load_begin begin{};
+    begin.slot_count = slot_count;
+    begin.chain_bits = chain_bits;
+    begin.cycles = cycles;
+    begin.program_bytes = uint32_t(program.size());
+    begin.program_crc32 = ols_crc32(0, program.data(), program.size());
     if (const auto reply = request(OLS_LOAD_BEGIN, bytes_of(begin)); !reply.ok()) return reply.error();
     constexpr size_t data_bytes_max = OLS_PAYLOAD_BYTES_MAX - sizeof(ols_load_chunk);
     for (size_t offset = 0; offset < program.size(); offset += data_bytes_max) {
@@ -161,7 +175,10 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
 }
 
 Status Board::arm() {
-    return command(OLS_ARM);
+    const ols_arm arm{};  // no heartbeat: a capture host may be busy for longer than it is good to play on
+    const auto reply = request(OLS_ARM, bytes_of(arm));
+    if (!reply.ok()) return reply.error();
+    return Done{};
 }
 
 Status Board::start() {

@@ -197,7 +197,8 @@ bool has_unique_order(const std::vector<SlotKind>& cycle) {
 
 std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage) {
     const size_t words = (size_t(stage.chain_bits) + 31) / 32;
-    std::vector<uint8_t> bytes;
+    std::vector<ols_slot> heads;
+    std::vector<uint32_t> patterns;
     for (const Slot& slot : sequence.slots) {
         ols_slot head{};
         head.kind = uint8_t(slot.kind);
@@ -209,11 +210,14 @@ std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig&
             const int bit = stage.chain_bit_of_lamp[lamp];
             if (slot.lit[lamp]) pattern[size_t(bit) / 32] |= 1u << (31 - bit % 32);
         }
-        const size_t at = bytes.size();
-        bytes.resize(at + sizeof head + words * sizeof(uint32_t));
-        std::memcpy(&bytes[at], &head, sizeof head);
-        std::memcpy(&bytes[at + sizeof head], pattern.data(), words * sizeof(uint32_t));
+        heads.push_back(head);
+        patterns.insert(patterns.end(), pattern.begin(), pattern.end());
     }
+    const size_t head_bytes = heads.size() * sizeof(ols_slot), pattern_bytes = patterns.size() * sizeof(uint32_t);
+    std::vector<uint8_t> bytes(head_bytes + pattern_bytes);
+    if (bytes.empty()) return bytes;
+    std::memcpy(bytes.data(), heads.data(), head_bytes);
+    std::memcpy(bytes.data() + head_bytes, patterns.data(), pattern_bytes);
     return bytes;
 }
 

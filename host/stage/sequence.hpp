@@ -70,7 +70,7 @@ Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfi
 // camera sees of it fixes the slot.
 bool has_unique_order(const std::vector<SlotKind>& cycle);
 
-// The bytes of OLS_LOAD_CHUNK (protocol/wire.h): for each slot an ols_slot and its pattern in chain order.
+// The bytes of OLS_LOAD_CHUNK (protocol/wire.h): an ols_slot for each slot, then their patterns in chain order.
 std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage);
 
 }  // namespace ols

@@ -64,7 +64,7 @@ def test_in_wall_pace_the_board_is_not_faster_than_the_clock_and_counts_what_nob
     board = emulated("--pace", "wall", exposures=True)
     link = board.plug()
     link.load(paper_program(cycles=4, slots=slots))
-    link.ask(wire.ARM)
+    link.arm()
     begin = time.monotonic()
     link.ask(wire.START)
     status = link.wait_until([wire.DONE, wire.FAULT])

@@ -30,6 +30,7 @@ struct PioMachine {
     uint64_t words_fed = UINT64_MAX;
 
     int pc = 0, delay = 0;
+    bool irq_raised = false;  // by an `irq wait` that waits for it to be cleared
     uint32_t x = 0, y = 0, isr = 0, osr = 0;
     int bits_out = 32;
     uint64_t words_pulled = 0;
@@ -77,9 +78,15 @@ struct PioMachine {
                     pushed.push_back(isr);
                 break;
             case 5: mov(middle, word >> 3 & 3, word & 7); break;
-            case 6: block.flags |= 1u << operand; break;
+            case 6: irq(operand, word & 0x20, next); break;
             default: throw std::runtime_error("instruction unknown to this interpreter");
         }
+    }
+
+    void irq(int flag, bool waits, std::optional<int>& next) {
+        if (!irq_raised) block.flags |= 1u << flag;
+        irq_raised = waits && (!irq_raised || block.flags >> flag & 1);
+        if (irq_raised) next = {};
     }
 
     bool jumps(int condition) {
@@ -102,6 +109,7 @@ struct PioMachine {
         switch (destination) {
             case 0: set_pins(out_pin, out_count, value); break;
             case 1: x = value; break;
+            case 2: y = value; break;
             case 5: next = int(value); break;
             default: throw std::runtime_error("destination unknown to this interpreter");
         }

@@ -149,7 +149,8 @@ TEST(Board, the_trigger_log_is_read_entry_by_entry) {
         std::memcpy(&what, payload.data(), sizeof what);
         Bytes reply = bytes_of(ols_trigger_log_reply{what.first_counter, what.first_counter + 40, 5, 3, 0});
         for (uint32_t i = 0; i < 3; ++i) {
-            const Bytes entry = bytes_of(ols_trigger_log_entry{1000ull * i, what.first_counter + i, 2, uint16_t(i), 1});
+            const Bytes entry =
+                bytes_of(ols_trigger_log_entry{1000ull * i, what.first_counter + i, 2, uint16_t(i), 1, 0});
             reply.insert(reply.end(), entry.begin(), entry.end());
         }
         return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};

@@ -19,31 +19,39 @@ def fixed(text, size):
     return text.encode().ljust(size, b'\0')
 
 
-def slot(kind, triggers, exposure_ticks, period_ticks, words):
-    return struct.pack('<BBHIIi', kind, triggers, 0, exposure_ticks, period_ticks, 0) + struct.pack('<6I', *words)
+def slot(kind, triggers, exposure_ticks, period_ticks, offset_ticks):
+    return struct.pack('<BBHIIi', kind, triggers, 0, exposure_ticks, period_ticks, offset_ticks)
 
 
-PROGRAM = slot(1, 0x3, 6250, 57870, [0xffffffff] * 4 + [0xfffffffc, 0]) + slot(3, 0x1, 51500, 57870, [0] * 6)
+def trigger(offset_ticks, width_ticks, skip_kinds, active_low):
+    return struct.pack('<iIBBH', offset_ticks, width_ticks, skip_kinds, active_low, 0)
+
+
+PROGRAM = (slot(1, 0x3, 6250, 57870, -500) + slot(3, 0x1, 51500, 57870, 0) +
+           struct.pack('<12I', *[0xffffffff] * 4, 0xfffffffc, 0, *[0] * 6))
+TRIGGERS = trigger(-2000, 0, 0, 0) + trigger(100, 6250, 0b1101, 1) + 2 * trigger(0, 0, 0, 0)
 # name: (type, payload), all with request id 0x1234.
 MESSAGES = {
     'hello': (0x01, struct.pack('<Q', HASH)),
-    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHII', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
-                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27)),
-    'load_begin': (0x02, struct.pack('<HHIII', 2, 176, 1000, len(PROGRAM), zlib.crc32(PROGRAM))),
+    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHH', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
+                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750)),
+    'load_begin': (0x02, struct.pack('<HHIIII', 2, 176, 1000, len(PROGRAM), zlib.crc32(PROGRAM), 2500) + TRIGGERS),
     'load_begin_reply': (0x02 | REPLY, b''),
     'load_chunk': (0x03, struct.pack('<I', 0) + PROGRAM),
     'load_end': (0x04, b''),
-    'arm': (0x05, b''),
+    'arm': (0x05, struct.pack('<I', 12500000)),
     'start': (0x06, b''),
     'stop': (0x07, b''),
     'status': (0x08, b''),
-    'status_reply': (0x08 | REPLY, struct.pack('<BBHIQQIIII', 5, 2, 179, 0xdeadbeef, 0x1_0000_0001, 0x2_0000_0002,
-                                               1234567, 6858, 17, zlib.crc32(PROGRAM))),
+    'status_reply': (0x08 | REPLY, struct.pack('<BBHIQQIIIIB3x', 5, 2, 179, 0xdeadbeef, 0x1_0000_0001, 0x2_0000_0002,
+                                               1234567, 6858, 17, zlib.crc32(PROGRAM), 2)),
     'read_trigger_log': (0x09, struct.pack('<IHH', 358, 48, 0)),
     'trigger_log_reply': (0x09 | REPLY, struct.pack('<IIIHH', 358, 360, 3, 2, 0) +
-                          struct.pack('<QIIHH', 20717472, 358, 1, 178, 1) +
-                          struct.pack('<QIIHH', 20775342, 359, 1, 179, 3)),
+                          struct.pack('<QIIHBB', 20717472, 358, 1, 178, 1, 0) +
+                          struct.pack('<QIIHBB', 20775342, 359, 1, 179, 3, 2)),
     'clear_fault': (0x0a, b''),
+    'swap': (0x0b, b''),
+    'swap_reply': (0x0b | REPLY, struct.pack('<IB3x', 1234, 2)),
     'error_reply': (0x7f | REPLY, struct.pack('<HH116s', 6, 7, fixed('slot 7: trigger mask 16: 15 at most', 116))),
 }
 

@@ -86,7 +86,7 @@ Take record(SyntheticStage& stage) {
     for (uint32_t n = 0; n < take.triggers; ++n) {
         const size_t slot = n % sequence.slots.size();
         const uint64_t rise_ticks = 1000 + uint64_t(n) * sequence.slots[0].period_ticks;
-        take.log.push_back({rise_ticks & ~1ull, n, uint32_t(n / sequence.slots.size()), uint16_t(slot), 1});
+        take.log.push_back({rise_ticks & ~1ull, n, uint32_t(n / sequence.slots.size()), uint16_t(slot), 1, 0});
         FrameWitness witness;
         witness.stamp.frame_id = n + 1;
         witness.stamp.timestamp_ns = clock_offset_ns + uint64_t(double(rise_ticks) * 8 * (1 + clock_drift));

@@ -56,6 +56,8 @@ class Link : public testing::Test {
         return {got.type, got.request_id, Bytes(got.payload, got.payload + got.payload_bytes)};
     }
 
+    Reply arm(uint32_t heartbeat_ticks = 0) { return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks})); }
+
     ols_status_reply status() { return ask(OLS_STATUS).as<ols_status_reply>(); }
 
     static Bytes program(int slots, uint32_t period_ticks = 57'870) {
@@ -67,15 +69,21 @@ class Link : public testing::Test {
             slot.period_ticks = period_ticks;
             const Bytes header = bytes_of(slot);
             all.insert(all.end(), header.begin(), header.end());
+        }
+        for (int n = 0; n < slots; n++)
             for (int word = 0; word < 6; word++)
                 for (int byte = 0; byte < 4; byte++) all.push_back(word < 5 ? uint8_t(37 * n + word) : 0);
-        }
         return all;
     }
 
     static ols_load_begin begin_for(const Bytes& program, uint32_t cycles) {
-        return {uint16_t(program.size() / 40), 176, cycles, uint32_t(program.size()),
-                ols_crc32(0, program.data(), program.size())};
+        ols_load_begin begin{};
+        begin.slot_count = uint16_t(program.size() / 40);
+        begin.chain_bits = 176;
+        begin.cycles = cycles;
+        begin.program_bytes = uint32_t(program.size());
+        begin.program_crc32 = ols_crc32(0, program.data(), program.size());
+        return begin;
     }
 
     Reply load(const Bytes& program, uint32_t cycles = 1) {
@@ -91,7 +99,7 @@ class Link : public testing::Test {
 
     void play(uint32_t cycles = 0) {
         ASSERT_TRUE(load(program(18), cycles).ok(OLS_LOAD_END));
-        ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+        ASSERT_TRUE(arm().ok(OLS_ARM));
         ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     }
 
@@ -100,7 +108,8 @@ class Link : public testing::Test {
         EXPECT_EQ(now.state, OLS_STATE_FAULT);
         EXPECT_EQ(now.fault, cause);
         EXPECT_FALSE(board_host_pins_are_connected());
-        for (const uint16_t type : {OLS_ARM, OLS_START, OLS_STOP, OLS_LOAD_END})
+        EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
+        for (const uint16_t type : {OLS_START, OLS_STOP, OLS_LOAD_END})
             EXPECT_EQ(ask(type).error(), OLS_ERROR_FAULT_LATCHED) << "until it is cleared";
         EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_FAULT_LATCHED);
         EXPECT_TRUE(ask(OLS_CLEAR_FAULT).ok(OLS_CLEAR_FAULT));
@@ -131,7 +140,7 @@ TEST_F(Link, a_program_is_loaded_played_and_logged) {
     ASSERT_TRUE(load(program(180), 2).ok(OLS_LOAD_END));
     EXPECT_EQ(status().state, OLS_STATE_LOADED);
     EXPECT_FALSE(board_host_pins_are_connected());
-    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    ASSERT_TRUE(arm().ok(OLS_ARM));
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     EXPECT_EQ(status().state, OLS_STATE_PLAYING);
     board_host_run_us(100'000);
@@ -163,7 +172,7 @@ TEST_F(Link, a_finished_program_can_be_played_again) {
     play(1);
     board_host_run_us(20'000);
     EXPECT_EQ(status().state, OLS_STATE_DONE);
-    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    ASSERT_TRUE(arm().ok(OLS_ARM));
     EXPECT_EQ(status().triggers_fired, 0u);
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     board_host_run_us(20'000);
@@ -179,21 +188,90 @@ TEST_F(Link, stop_is_dark_at_once) {
 }
 
 TEST_F(Link, commands_out_of_order_are_refused_and_change_nothing) {
-    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(arm().error(), OLS_ERROR_BAD_STATE);
     EXPECT_EQ(ask(OLS_START).error(), OLS_ERROR_BAD_STATE);
     EXPECT_EQ(ask(OLS_STOP).error(), OLS_ERROR_BAD_STATE);
     EXPECT_EQ(ask(OLS_LOAD_END).error(), OLS_ERROR_BAD_STATE);
     EXPECT_EQ(ask(OLS_CLEAR_FAULT).error(), OLS_ERROR_BAD_STATE);
     ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
     EXPECT_EQ(ask(OLS_START).error(), OLS_ERROR_BAD_STATE);
-    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
-    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
-    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    ASSERT_TRUE(arm().ok(OLS_ARM));
+    EXPECT_EQ(arm().error(), OLS_ERROR_BAD_STATE);
     const Reply refused = ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1)));
     EXPECT_EQ(refused.error(), OLS_ERROR_BAD_STATE);
-    EXPECT_NE(refused.text().find("stop it before loading"), std::string::npos);
+    EXPECT_NE(refused.text().find("before loading"), std::string::npos);
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE);
     board_host_run_us(30'000);
     EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, the_next_program_is_loaded_while_one_plays_and_follows_at_the_end_of_a_cycle) {
+    play(0);
+    board_host_run_us(5'000);
+    ASSERT_TRUE(load(program(7, 60'000), 2).ok(OLS_LOAD_END));
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+    EXPECT_EQ(status().next, OLS_NEXT_READY);
+    const Reply reply = ask(OLS_SWAP);
+    ASSERT_TRUE(reply.ok(OLS_SWAP)) << reply.text();
+    const auto swap = reply.as<ols_swap_reply>();
+    EXPECT_EQ(swap.after_cycles, 2u);
+    EXPECT_EQ(swap.program, 1);
+    EXPECT_EQ(status().next, OLS_NEXT_SWAPPING);
+    EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_BAD_STATE);
+    board_host_run_us(50'000);
+    const ols_status_reply done = status();
+    EXPECT_EQ(done.state, OLS_STATE_DONE);
+    EXPECT_EQ(done.fault, OLS_FAULT_NONE);
+    EXPECT_EQ(done.next, OLS_NEXT_NONE);
+    EXPECT_EQ(done.triggers_fired, 2u * 18 + 2 * 7);
+    EXPECT_EQ(done.cycles_played, 2u);
+    EXPECT_EQ(done.program_crc32, begin_for(program(7, 60'000), 2).program_crc32);
+    const Reply log = ask(OLS_READ_TRIGGER_LOG, bytes_of(ols_read_trigger_log{35, 2, 0}));
+    ols_trigger_log_entry entries[2];
+    memcpy(entries, log.payload.data() + sizeof(ols_trigger_log_reply), sizeof entries);
+    EXPECT_EQ(entries[1].rise_ticks - entries[0].rise_ticks, 57'870u) << "no slot is late";
+    EXPECT_EQ(entries[0].program, 0);
+    EXPECT_EQ(entries[1].program, 1);
+    EXPECT_EQ(entries[1].slot, 0);
+}
+
+TEST_F(Link, a_bad_next_program_leaves_the_playing_one_alone) {
+    play(0);
+    Bytes impossible = program(18);
+    impossible[8] = impossible[9] = impossible[10] = 0;
+    EXPECT_EQ(load(impossible).error(), OLS_ERROR_BAD_PROGRAM);
+    EXPECT_EQ(status().next, OLS_NEXT_NONE);
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE);
+    board_host_run_us(30'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, a_next_program_that_was_not_swapped_in_is_the_one_that_arm_plays) {
+    play(1);
+    ASSERT_TRUE(load(program(5), 1).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE) << "one cycle is over before any swap";
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().triggers_fired, 18u);
+    ASSERT_TRUE(arm().ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().triggers_fired, 5u);
+}
+
+TEST_F(Link, programs_whose_cycles_begin_otherwise_cannot_be_swapped) {
+    play(0);
+    ols_load_begin begin = begin_for(program(18), 0);
+    begin.lead_ticks = 500;
+    ASSERT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin)).ok(OLS_LOAD_BEGIN));
+    Bytes chunk = bytes_of(ols_load_chunk{0});
+    const Bytes data = program(18);
+    chunk.insert(chunk.end(), data.begin(), data.end());
+    ASSERT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
+    ASSERT_TRUE(ask(OLS_LOAD_END).ok(OLS_LOAD_END));
+    const Reply reply = ask(OLS_SWAP);
+    EXPECT_EQ(reply.error(), OLS_ERROR_BAD_PROGRAM);
+    EXPECT_NE(reply.text().find("lead_ticks"), std::string::npos);
 }
 
 TEST_F(Link, a_damaged_program_is_refused_and_gone) {
@@ -206,12 +284,12 @@ TEST_F(Link, a_damaged_program_is_refused_and_gone) {
     ASSERT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
     EXPECT_EQ(ask(OLS_LOAD_END).error(), OLS_ERROR_BAD_CRC);
     EXPECT_EQ(status().state, OLS_STATE_IDLE);
-    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_BAD_STATE);
+    EXPECT_EQ(arm().error(), OLS_ERROR_BAD_STATE);
 }
 
 TEST_F(Link, an_impossible_program_is_refused_with_its_slot) {
     Bytes impossible = program(18);
-    impossible[7 * 40 + 8] = impossible[7 * 40 + 9] = impossible[7 * 40 + 10] = 0;  // slot 7: period 0
+    impossible[7 * 16 + 8] = impossible[7 * 16 + 9] = impossible[7 * 16 + 10] = 0;  // slot 7: period 0
     const Reply reply = load(impossible);
     EXPECT_EQ(reply.error(), OLS_ERROR_BAD_PROGRAM);
     EXPECT_EQ(reply.as<ols_error_reply>().slot, 7);
@@ -238,7 +316,7 @@ TEST_F(Link, chunks_out_of_place_end_the_loading) {
 
 TEST_F(Link, wrong_lengths_and_unknown_messages_are_refused) {
     EXPECT_EQ(ask(OLS_HELLO, Bytes(7)).error(), OLS_ERROR_BAD_LENGTH);
-    EXPECT_EQ(ask(OLS_ARM, Bytes(1)).error(), OLS_ERROR_BAD_LENGTH);
+    EXPECT_EQ(ask(OLS_ARM, Bytes(3)).error(), OLS_ERROR_BAD_LENGTH);
     EXPECT_EQ(ask(OLS_LOAD_CHUNK, Bytes(3)).error(), OLS_ERROR_BAD_LENGTH);
     EXPECT_EQ(ask(OLS_READ_TRIGGER_LOG, Bytes(9)).error(), OLS_ERROR_BAD_LENGTH);
     EXPECT_EQ(ask(0x55).error(), OLS_ERROR_UNKNOWN_MESSAGE);
@@ -262,7 +340,7 @@ TEST_F(Link, a_starved_shifter_is_a_fault_while_playing_and_arming) {
     board_host_run_us(1'000);
     expect_fault(OLS_FAULT_SHIFTER_STARVED);
     ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_FAULT_LATCHED);
+    EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
     expect_fault(OLS_FAULT_SHIFTER_STARVED);
 }
 
@@ -286,11 +364,62 @@ TEST_F(Link, a_lost_host_is_a_fault_while_armed_and_while_playing_and_none_while
     board_host_attach();
     expect_fault(OLS_FAULT_HOST_LOST);
     ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-    ASSERT_TRUE(ask(OLS_ARM).ok(OLS_ARM));
+    ASSERT_TRUE(arm().ok(OLS_ARM));
     board_host_detach();
     board_host_run_us(1'000);
     board_host_attach();
     expect_fault(OLS_FAULT_HOST_LOST);
+}
+
+TEST_F(Link, each_stop_input_is_a_fault_of_its_own_while_armed_and_while_playing_however_short) {
+    const ols_fault causes[] = {OLS_FAULT_EMERGENCY_STOP, OLS_FAULT_OVER_TEMPERATURE, OLS_FAULT_OPEN_LAMP};
+    for (unsigned input = 0; input < 3; input++) {
+        play();
+        board_host_run_us(5'000);
+        board_host_pull_stop_input(input, true);
+        board_host_pull_stop_input(input, false);
+        board_host_run_us(1'000);
+        EXPECT_EQ(status().fault_slot, 6'000 * 125 / 57'870);
+        expect_fault(causes[input]);
+        ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
+        ASSERT_TRUE(arm().ok(OLS_ARM));
+        board_host_pull_stop_input(input, true);
+        board_host_run_us(1'000);
+        expect_fault(causes[input]);
+        ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
+        EXPECT_EQ(arm().error(), OLS_ERROR_NOT_SAFE) << "while it is low";
+        EXPECT_EQ(status().state, OLS_STATE_LOADED);
+        board_host_pull_stop_input(input, false);
+        EXPECT_TRUE(arm().ok(OLS_ARM)) << "and what fell while nothing was armed is forgotten";
+        EXPECT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
+    }
+}
+
+TEST_F(Link, a_silent_host_is_a_fault_only_with_a_heartbeat_and_any_message_is_one) {
+    ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
+    EXPECT_EQ(arm(OLS_HEARTBEAT_TICKS_MIN - 1).error(), OLS_ERROR_BAD_PROGRAM);
+    ASSERT_TRUE(arm(20 * 125'000).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    for (int n = 0; n < 5; n++) {
+        board_host_run_us(19'000);
+        EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+    }
+    board_host_run_us(19'000);
+    EXPECT_TRUE(board_host_pins_are_connected());
+    board_host_run_us(3'000);
+    EXPECT_FALSE(board_host_pins_are_connected());
+    expect_fault(OLS_FAULT_HEARTBEAT);
+    play();
+    board_host_run_us(60'000'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Link, a_program_that_lights_a_lamp_for_too_much_of_the_cycle_is_refused) {
+    Bytes hot = program(18);
+    for (int n = 0; n < 18; n++) hot[size_t(18 * 16 + n * 24)] = 1;  // one lamp in every slot, 86 %
+    const Reply reply = load(hot);
+    EXPECT_EQ(reply.error(), OLS_ERROR_OVER_LIMIT);
+    EXPECT_NE(reply.text().find("chain bit 31"), std::string::npos) << reply.text();
 }
 
 TEST_F(Link, a_hang_is_a_fault_with_slot_after_the_reset) {
@@ -309,7 +438,7 @@ TEST_F(Link, a_program_that_changed_in_memory_is_a_fault) {
     play(1);
     board_host_run_us(20'000);
     board_host_corrupt_program();
-    EXPECT_EQ(ask(OLS_ARM).error(), OLS_ERROR_FAULT_LATCHED);
+    EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
     expect_fault(OLS_FAULT_BAD_MEMORY);
 }
 

@@ -128,8 +128,8 @@ TEST(SequenceCompiler, the_program_bytes_are_slots_and_patterns_most_significant
     const auto sequence = compile_sequence(config, stage);
     ASSERT_TRUE(sequence.ok());
     const auto bytes = encode_program(*sequence, stage);
-    const size_t record = 16 + 6 * 4;
-    ASSERT_EQ(bytes.size(), 180 * record);
+    const size_t record = 16, pattern_bytes = 6 * 4;  // all slots first, then all patterns
+    ASSERT_EQ(bytes.size(), 180 * (record + pattern_bytes));
     for (size_t s = 0; s < 180; ++s) {
         const Slot& slot = sequence->slots[s];
         EXPECT_EQ(bytes[s * record], uint8_t(slot.kind));
@@ -145,7 +145,7 @@ TEST(SequenceCompiler, the_program_bytes_are_slots_and_patterns_most_significant
         const int bit = lamp == 3 ? 175 : lamp;
         for (int b = 0; b < 192; ++b) {
             uint32_t word;
-            std::memcpy(&word, &bytes[s * record + 16 + size_t(b / 32) * 4], 4);
+            std::memcpy(&word, &bytes[180 * record + s * pattern_bytes + size_t(b / 32) * 4], 4);
             ASSERT_EQ(word >> (31 - b % 32) & 1, b == bit ? 1u : 0u);
         }
     }

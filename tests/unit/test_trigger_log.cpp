@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <initializer_list>
 #include <memory>
 #include <vector>
 
@@ -12,15 +14,20 @@ namespace {
 
 constexpr uint64_t first_rise = 20;  // ticks after start
 
-// Four slots; slot 2 does not fire TRIG0.
-std::unique_ptr<sequence> sequence_of_four() {
+std::unique_ptr<sequence> sequence_of(std::initializer_list<ols_slot> slots) {
     auto made = std::make_unique<sequence>();
-    made->slot_count = 4;
-    made->slots[0] = {50'000, 1};
-    made->slots[1] = {60'000, 3};
-    made->slots[2] = {70'000, 2};
-    made->slots[3] = {80'000, 1};
+    made->header.slot_count = uint16_t(slots.size());
+    std::copy(slots.begin(), slots.end(), reinterpret_cast<ols_slot*>(made->words));
     return made;
+}
+
+ols_slot slot(uint8_t trigger_mask, uint32_t period_ticks, int32_t offset_ticks = 0) {
+    return {OLS_BASIS, trigger_mask, 0, 1000, period_ticks, offset_ticks};
+}
+
+// Slot 2 does not fire TRIG0.
+std::unique_ptr<sequence> sequence_of_four() {
+    return sequence_of({slot(1, 50'000), slot(3, 60'000), slot(2, 70'000), slot(1, 80'000)});
 }
 
 uint32_t stamp_at(uint64_t ticks) {
@@ -63,6 +70,14 @@ TEST(TriggerLog, notices_a_trigger_that_is_not_where_it_was_scheduled) {
     }
 }
 
+TEST(TriggerLog, expects_each_trigger_at_its_own_offset) {
+    const auto played = sequence_of({slot(1, 50'000, -4000), slot(3, 60'000, 2500), slot(2, 70'000), slot(1, 80'000)});
+    trigger_log_begin(played.get());
+    EXPECT_TRUE(trigger_log_add(stamp_at(20), 30));
+    EXPECT_TRUE(trigger_log_add(stamp_at(20 + 50'000 + 6500), 60'000));
+    EXPECT_FALSE(trigger_log_add(stamp_at(20 + 180'000), 190'000)) << "that one is due at 184 000";
+}
+
 TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
     const auto played = sequence_of_four();
     trigger_log_begin(played.get());
@@ -77,9 +92,7 @@ TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
 }
 
 TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
-    auto slow = std::make_unique<sequence>();
-    slow->slot_count = 1;
-    slow->slots[0] = {4'000'000'001u, 1};  // 32 s; the stamps wrap every 68.7 s
+    const auto slow = sequence_of({slot(1, 4'000'000'001u)});  // 32 s; the stamps wrap every 68.7 s
     trigger_log_begin(slow.get());
     for (uint64_t n = 0; n < 20; n++) {
         const uint64_t rise = first_rise + n * 4'000'000'001u;
@@ -92,9 +105,7 @@ TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
 }
 
 TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
-    auto fast = std::make_unique<sequence>();
-    fast->slot_count = 1;
-    fast->slots[0] = {2000, 1};
+    const auto fast = sequence_of({slot(1, 2000)});
     trigger_log_begin(fast.get());
     auto fire = [&, n = uint64_t(0)](int count) mutable {
         for (; count > 0; count--, n++) ASSERT_TRUE(trigger_log_add(stamp_at(n * 2000), n * 2000));
@@ -135,6 +146,37 @@ TEST(TriggerLog, reading_past_the_end_gives_nothing) {
     ols_trigger_log_reply header;
     EXPECT_TRUE(read_all(7, header).empty());
     EXPECT_EQ(header.next_counter, 1u);
+}
+
+TEST(TriggerLog, follows_a_swap_to_the_next_program_at_its_cycle) {
+    const auto first = sequence_of_four();
+    const auto second = sequence_of({slot(1, 30'000), slot(1, 40'000)});
+    trigger_log_begin(first.get());
+    EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
+    trigger_log_swap(second.get(), 1);
+    for (const uint64_t rise : {50'000, 180'000, 260'000, 290'000, 330'000})
+        EXPECT_TRUE(trigger_log_add(stamp_at(20 + rise), rise + 100)) << rise;
+    ols_trigger_log_reply header;
+    const auto entries = read_all(0, header);
+    ASSERT_EQ(entries.size(), 6u);
+    const uint16_t slots[] = {0, 1, 3, 0, 1, 0}, programs[] = {0, 0, 0, 1, 1, 1}, cycles[] = {0, 0, 0, 0, 0, 1};
+    for (int n = 0; n < 6; n++) {
+        EXPECT_EQ(entries[n].slot, slots[n]);
+        EXPECT_EQ(entries[n].program, programs[n]);
+        EXPECT_EQ(entries[n].cycle, cycles[n]);
+    }
+}
+
+TEST(TriggerLog, a_program_without_watched_triggers_is_passed_on_the_way_to_the_next) {
+    const auto silent = sequence_of({slot(2, 50'000), slot(2, 50'000)});
+    const auto second = sequence_of({slot(1, 30'000)});
+    trigger_log_begin(silent.get());
+    trigger_log_swap(second.get(), 3);
+    EXPECT_TRUE(trigger_log_add(stamp_at(300'020), 300'100));
+    EXPECT_TRUE(trigger_log_add(stamp_at(330'020), 330'100));
+    EXPECT_EQ(trigger_log_cycle(), 1u);
+    trigger_log_begin(silent.get());
+    EXPECT_FALSE(trigger_log_add(stamp_at(20), 20)) << "without a swap, it is a trigger that nobody asked for";
 }
 
 }  // namespace

@@ -54,21 +54,18 @@ void expect_golden(const char* name, uint16_t type, const Bytes& payload) {
 constexpr uint64_t hash = 0x0123456789abcdef;
 
 struct TwoSlots {
-    struct {
-        ols_slot slot;
-        uint32_t words[6];
-    } slots[2] = {{{OLS_TRACKING, 3, 0, 6250, 57870, 0}, {~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}},
-                  {{OLS_DARK, 1, 0, 51500, 57870, 0}, {}}};
+    ols_slot slots[2] = {{OLS_TRACKING, 3, 0, 6250, 57870, -500}, {OLS_DARK, 1, 0, 51500, 57870, 0}};
+    uint32_t patterns[2][6] = {{~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}, {}};
 };
 
 TEST(Wire, messages_without_payload) {
     expect_golden("load_begin_reply", OLS_LOAD_BEGIN | OLS_REPLY, {});
     expect_golden("load_end", OLS_LOAD_END, {});
-    expect_golden("arm", OLS_ARM, {});
     expect_golden("start", OLS_START, {});
     expect_golden("stop", OLS_STOP, {});
     expect_golden("status", OLS_STATUS, {});
     expect_golden("clear_fault", OLS_CLEAR_FAULT, {});
+    expect_golden("swap", OLS_SWAP, {});
 }
 
 TEST(Wire, hello_and_its_reply) {
@@ -84,29 +81,58 @@ TEST(Wire, hello_and_its_reply) {
     reply.slots_max = 1024;
     reply.shift_ticks = 1259;
     reply.slot_gap_ticks = 27;
+    reply.lamps_lit_max = 171;
+    reply.lamp_duty_max_permille = 750;
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 
 TEST(Wire, loading) {
     const TwoSlots program;
     const uint32_t crc = ols_crc32(0, &program, sizeof program);
-    expect_golden("load_begin", OLS_LOAD_BEGIN, join(ols_load_begin{2, 176, 1000, sizeof program, crc}));
+    expect_golden(
+        "load_begin", OLS_LOAD_BEGIN,
+        join(ols_load_begin{
+            2,
+            176,
+            1000,
+            sizeof program,
+            crc,
+            2500,
+            {{-2000, 0, 0, 0, 0}, {100, 6250, 1 << OLS_BASIS | 1 << OLS_MATTE | 1 << OLS_DARK, 1, 0}, {}, {}}}));
     expect_golden("load_chunk", OLS_LOAD_CHUNK, join(ols_load_chunk{0}, program));
+}
+
+TEST(Wire, arm) {
+    expect_golden("arm", OLS_ARM, join(ols_arm{12500000}));
+}
+
+TEST(Wire, swap_reply) {
+    expect_golden("swap_reply", OLS_SWAP | OLS_REPLY, join(ols_swap_reply{1234, 2, {}}));
 }
 
 TEST(Wire, status_reply) {
     const TwoSlots program;
     const uint32_t crc = ols_crc32(0, &program, sizeof program);
     expect_golden("status_reply", OLS_STATUS | OLS_REPLY,
-                  join(ols_status_reply{OLS_STATE_FAULT, OLS_FAULT_SHIFTER_STARVED, 179, 0xdeadbeef, 0x1'0000'0001,
-                                        0x2'0000'0002, 1234567, 6858, 17, crc}));
+                  join(ols_status_reply{OLS_STATE_FAULT,
+                                        OLS_FAULT_SHIFTER_STARVED,
+                                        179,
+                                        0xdeadbeef,
+                                        0x1'0000'0001,
+                                        0x2'0000'0002,
+                                        1234567,
+                                        6858,
+                                        17,
+                                        crc,
+                                        OLS_NEXT_READY,
+                                        {}}));
 }
 
 TEST(Wire, trigger_log) {
     expect_golden("read_trigger_log", OLS_READ_TRIGGER_LOG, join(ols_read_trigger_log{358, 48, 0}));
     expect_golden("trigger_log_reply", OLS_READ_TRIGGER_LOG | OLS_REPLY,
-                  join(ols_trigger_log_reply{358, 360, 3, 2, 0}, ols_trigger_log_entry{20717472, 358, 1, 178, 1},
-                       ols_trigger_log_entry{20775342, 359, 1, 179, 3}));
+                  join(ols_trigger_log_reply{358, 360, 3, 2, 0}, ols_trigger_log_entry{20717472, 358, 1, 178, 1, 0},
+                       ols_trigger_log_entry{20775342, 359, 1, 179, 3, 2}));
 }
 
 TEST(Wire, error_reply) {

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import tempfile
 import time
-import zlib
 
 from ols_board import wire
 from ols_board.usb import OK, Usb
@@ -95,7 +94,7 @@ class Link:
 
     def ask(self, message_type, payload=b""):
         """Sends a request and returns the reply's payload. Raises BoardError for an error reply."""
-        self.request_id += 1
+        self.request_id = (self.request_id + 1) & 0xFFFF
         status = self.usb.write(wire.frame(message_type, self.request_id, payload))
         if status != OK:
             raise ConnectionError(f"transfer status {status}")
@@ -116,27 +115,33 @@ class Link:
 
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
-                 "slots_max", "shift_ticks", "slot_gap_ticks")
+                 "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 
     def status(self):
         names = ("state", "fault", "fault_slot", "boot_nonce", "fault_ticks", "now_ticks", "triggers_fired",
-                 "cycles_played", "log_entries_lost", "program_crc32")
+                 "cycles_played", "log_entries_lost", "program_crc32", "next")
         return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
 
     def load(self, program, chunk_bytes=1000):
         data = wire.program_bytes(program)
-        self.ask(wire.LOAD_BEGIN, wire.LOAD_BEGIN_REQUEST.pack(len(program["slots"]), program["chain_bits"],
-                                                               program["cycles"], len(data), zlib.crc32(data)))
+        self.ask(wire.LOAD_BEGIN, wire.load_begin(program, data))
         for offset in range(0, len(data), chunk_bytes):
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)
 
-    def play(self, program):
+    def arm(self, heartbeat_ticks=0):
+        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks))
+
+    def play(self, program, heartbeat_ticks=0):
         self.load(program)
-        self.ask(wire.ARM)
+        self.arm(heartbeat_ticks)
         self.ask(wire.START)
+
+    def swap(self):
+        """Lets the loaded next program follow; returns after how many cycles, and its number."""
+        return wire.SWAP_REPLY.unpack(self.ask(wire.SWAP))
 
     def wait_until(self, states, polls=100_000):
         """Asks for the status until the board is in one of `states`; returns that status."""

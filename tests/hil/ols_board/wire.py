@@ -5,20 +5,25 @@ import zlib
 
 SYNC = 0x534C
 REPLY = 0x80
-HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT = range(1, 11)
+HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT, SWAP = range(1, 12)
 ERROR = 0x7F
 
 BASIS, TRACKING, MATTE, DARK = range(4)
+NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
 IDLE, LOADED, ARMED, PLAYING, DONE, FAULT = range(6)
-FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory")
-ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED = 3, 5, 7
+FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory",
+          "emergency stop", "over-temperature", "open lamp", "heartbeat")
+ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHII")
-STATUS_REPLY = struct.Struct("<BBHIQQIIII")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHH")
+ARM_REQUEST = struct.Struct("<I")
+STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
+SWAP_REPLY = struct.Struct("<IB3x")
 LOG_REPLY = struct.Struct("<IIIHH")
-LOG_ENTRY = struct.Struct("<QIIHH")
+LOG_ENTRY = struct.Struct("<QIIHBB")
 ERROR_REPLY = struct.Struct("<HH116s")
-LOAD_BEGIN_REQUEST = struct.Struct("<HHIII")
+LOAD_BEGIN_REQUEST = struct.Struct("<HHIIII")
+TRIGGER = struct.Struct("<iIBBH")
 SLOT = struct.Struct("<BBHIIi")
 
 
@@ -50,11 +55,23 @@ def pattern_words(bits):
     return [int("".join(map(str, padded[n : n + 32])), 2) for n in range(0, len(padded), 32)]
 
 
+def load_begin(program, data):
+    """The payload that announces `data`, the slots of a program. "triggers" holds up to four dictionaries."""
+    triggers = (program.get("triggers", []) + [{}] * 4)[:4]
+    return LOAD_BEGIN_REQUEST.pack(
+        len(program["slots"]), program["chain_bits"], program["cycles"], len(data), zlib.crc32(data),
+        program.get("lead_ticks", 0)) + b"".join(
+            TRIGGER.pack(trigger.get("offset_ticks", 0), trigger.get("width_ticks", 0), trigger.get("skip_kinds", 0),
+                         trigger.get("active_low", 0), 0) for trigger in triggers)
+
+
 def program_bytes(program):
-    """The slots of a program (see program.py) as they are loaded."""
+    """The slots of a program (see program.py) and then their patterns, as they are loaded."""
     out = bytearray()
     for slot in program["slots"]:
-        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"], 0)
+        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"],
+                         slot.get("trigger_offset_ticks", 0))
+    for slot in program["slots"]:
         words = pattern_words(slot["bits"])
         out += struct.pack(f"<{len(words)}I", *words)
     return bytes(out)

@@ -22,7 +22,7 @@ async function main() {
   const image = readImage(options.image);
   const vcd = options.vcd ? new VcdWriter(options.vcd) : null;
   const stage = options.exposures ? await ExposureSocket.open(options.exposures, options.pace === 'wall') : null;
-  const recorder = stage ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure)) : null;
+  const recorder = stage ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), options.activeLow) : null;
 
   const board = new Board(image, {
     naive: options.naive,

@@ -3,7 +3,7 @@
 // faults that are due.
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
-import { PIN_MASK, TRIGGERS } from './pins.mjs';
+import { PIN_MASK, STOP_INPUTS, TRIGGERS } from './pins.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
 
@@ -20,6 +20,7 @@ export class Board {
   #triggers = 0;
   #injections;
   #resetCause = null; // of a reset that is due
+  #inputs = new Map(Object.values(STOP_INPUTS).map((gpio) => [gpio, true])); // levels from outside, by GPIO
 
   /**
    * @param {object} image from readImage
@@ -94,6 +95,12 @@ export class Board {
     this.chip.core.waiting = true;
   }
 
+  /** Drives an input of the board from outside, until it is driven otherwise. */
+  drive(gpio, level) {
+    this.#inputs.set(gpio, level);
+    this.#parts.pads.drive(gpio, level);
+  }
+
   unplug() {
     this.usbHost.unplug();
     this.#options.onUnplug();
@@ -108,6 +115,7 @@ export class Board {
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
     this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & PIN_MASK);
+    for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     boot(this.chip, this.#image);
   }

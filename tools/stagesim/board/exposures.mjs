@@ -15,10 +15,15 @@ export class ExposureRecorder {
   #count = 0;
   #litSince = 0; // tick from which LIGHT_EN has been high with this pattern
   #open = TRIGGERS.map(() => null);
+  #activeLow;
   #emit;
 
-  /** @param {(exposure: Exposure) => void} emit called when a trigger falls */
-  constructor(chainBits, emit) {
+  /**
+   * @param {(exposure: Exposure) => void} emit called when a trigger ends
+   * @param {number[]} activeLow triggers whose camera exposes while the pin is low
+   */
+  constructor(chainBits, emit, activeLow = []) {
+    this.#activeLow = activeLow.reduce((mask, trigger) => mask | (1 << TRIGGERS[trigger]), 0);
     this.#chain = new Chain(chainBits);
     this.#emit = emit;
   }
@@ -28,8 +33,9 @@ export class ExposureRecorder {
     return Math.min(...this.#open.map((exposure) => exposure?.rise ?? Infinity));
   }
 
-  /** @param {number} levels of all GPIOs from `tick` on */
-  edge(tick, levels) {
+  /** @param {number} pads levels of all GPIOs from `tick` on */
+  edge(tick, pads) {
+    const levels = pads ^ this.#activeLow;
     const before = this.#levels;
     const rose = levels & ~before;
     const changed = levels ^ before;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Faults that tests inject into the emulated board, at a tick or at a trigger.
 import { starveDma } from './dma.mjs';
+import { STOP_INPUTS } from './pins.mjs';
 import { raiseHardFault } from './processor.mjs';
 import { Cause } from './system.mjs';
 
@@ -12,6 +13,10 @@ const FAULTS = {
   hardfault: (board) => raiseHardFault(board.chip),
   starve: (board) => starveDma(board.chip),
   unplug: (board) => board.unplug(),
+  estop: (board) => board.drive(STOP_INPUTS.ESTOP, false),
+  overtemperature: (board) => board.drive(STOP_INPUTS.OVER_TEMPERATURE, false),
+  openlamp: (board) => board.drive(STOP_INPUTS.OPEN_LAMP, false),
+  release: (board) => Object.values(STOP_INPUTS).forEach((gpio) => board.drive(gpio, true)),
 };
 
 /**

@@ -13,13 +13,15 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --vcd FILE          write the board's signals as a value change dump
   --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
   --pace wall         at most as fast as the wall clock; exposures that nobody takes in time are dropped and counted
+  --active-low N      the camera on trigger N exposes while its pin is low; may be given several times
   --chain-bits N      length of the lamps' shift chain (default 176)
   --naive             step every cycle: slow, for checking the fast way
   --cycles-limit N    end after N ticks of 8 ns
   --seed N            of the chip's random bits (default 1)
   --board-id HEX      the flash chip's unique number, 16 digits
-  --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; WHEN is a tick, or trigger:N for the
-                      N-th rise of any trigger; may be given several times
+  --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; estop, overtemperature, openlamp
+                      pull that input low, release lets all go high; WHEN is a tick, or trigger:N for the N-th rise of
+                      any trigger; may be given several times
   --stats             print ticks, speed and dropped lines as JSON at the end
   --help
 
@@ -38,7 +40,8 @@ export function parseOptions(args) {
         image: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
-        inject: { type: 'string', multiple: true, default: [] }, stats: flag, help: flag,
+        inject: { type: 'string', multiple: true, default: [] },
+        'active-low': { type: 'string', multiple: true, default: [] }, stats: flag, help: flag,
       },
     }));
   } catch (error) {
@@ -54,6 +57,7 @@ export function parseOptions(args) {
     chainBits,
     seed: integer('--seed', values.seed, 0),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
+    activeLow: values['active-low'].map((text) => trigger(text)),
     boardId: identity(values['board-id']),
     inject: values.inject.map(parseInjection),
   };
@@ -62,6 +66,11 @@ export function parseOptions(args) {
 function identity(text) {
   if (!/^[0-9a-f]{16}$/i.test(text)) throw new Error(`--board-id ${text}: not 16 hex digits`);
   return Uint8Array.from(Buffer.from(text, 'hex'));
+}
+
+function trigger(text) {
+  if (!/^[0-3]$/.test(text)) throw new Error(`--active-low ${text}: not a trigger, 0 to 3`);
+  return Number(text);
 }
 
 function integer(name, text, least) {

@@ -3,5 +3,7 @@
 export const PINS = Object.freeze({
   DATA: 2, CLK: 3, LATCH: 4, LIGHT_EN: 5, TRIG0: 6, TRIG1: 7, TRIG2: 8, TRIG3: 9, SYNC: 10,
 });
+/** Inputs that stop everything unless they are high: wired to a closed emergency stop and healthy drivers. */
+export const STOP_INPUTS = Object.freeze({ ESTOP: 12, OVER_TEMPERATURE: 13, OPEN_LAMP: 14 });
 export const TRIGGERS = Object.freeze([PINS.TRIG0, PINS.TRIG1, PINS.TRIG2, PINS.TRIG3]);
 export const PIN_MASK = Object.values(PINS).reduce((mask, gpio) => mask | (1 << gpio), 0);
