@@ -46,7 +46,7 @@ enum ols_message {
     OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
     OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
     OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
-    OLS_START = 0x06,             // armed -> playing
+    OLS_START = 0x06,             // armed -> playing, or waiting for the edge on GENLOCK that starts
     OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
     OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
     OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
@@ -62,6 +62,7 @@ struct ols_hello {
 
 enum ols_capability {
     OLS_CAN_OFFSET_TRIGGERS = 1,  // triggers may have offsets, widths and polarities of their own
+    OLS_CAN_START_BY_EDGE = 4,    // of GENLOCK
     OLS_CAN_SWAP = 2              // the next program can be loaded while one plays
 };
 
@@ -78,6 +79,7 @@ struct ols_hello_reply {
     uint32_t slot_gap_ticks;          // period_ticks - exposure_ticks must be at least this
     uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
     uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
+    uint32_t edge_start_ticks;        // from the rise of GENLOCK to the begin of the first cycle
 } OLS_PACKED;
 
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
@@ -124,8 +126,15 @@ struct ols_slot {
 
 #define OLS_HEARTBEAT_TICKS_MIN 625000  // 5 ms: the board looks every millisecond or two
 
+enum ols_start_source {
+    OLS_START_BY_COMMAND = 0,
+    OLS_START_BY_EDGE = 1  // the first rise of GENLOCK after OLS_START
+};
+
 struct ols_arm {
     uint32_t heartbeat_ticks;  // without a message for longer than this, armed or playing, is a fault; 0: never
+    uint8_t start_source;      // enum ols_start_source
+    uint8_t reserved[3];       // 0
 } OLS_PACKED;
 
 enum ols_state {
@@ -133,8 +142,9 @@ enum ols_state {
     OLS_STATE_LOADED = 1,
     OLS_STATE_ARMED = 2,
     OLS_STATE_PLAYING = 3,
-    OLS_STATE_DONE = 4,  // all cycles played; the program is still there
-    OLS_STATE_FAULT = 5  // dark until OLS_CLEAR_FAULT
+    OLS_STATE_DONE = 4,    // all cycles played; the program is still there
+    OLS_STATE_FAULT = 5,   // dark until OLS_CLEAR_FAULT
+    OLS_STATE_WAITING = 6  // for the edge that starts
 };
 
 // The program that is to follow the playing one.
@@ -226,12 +236,12 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 68, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 72, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
-OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 4, "arm");
+OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 8, "arm");
 OLS_WIRE_ASSERT(sizeof(struct ols_swap_reply) == 8, "swap reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 44, "status reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");

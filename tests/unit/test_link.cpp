@@ -56,7 +56,9 @@ class Link : public testing::Test {
         return {got.type, got.request_id, Bytes(got.payload, got.payload + got.payload_bytes)};
     }
 
-    Reply arm(uint32_t heartbeat_ticks = 0) { return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks})); }
+    Reply arm(uint32_t heartbeat_ticks = 0) {
+        return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks, OLS_START_BY_COMMAND, {}}));
+    }
 
     ols_status_reply status() { return ask(OLS_STATUS).as<ols_status_reply>(); }
 
@@ -420,6 +422,41 @@ TEST_F(Link, a_program_that_lights_a_lamp_for_too_much_of_the_cycle_is_refused) 
     const Reply reply = load(hot);
     EXPECT_EQ(reply.error(), OLS_ERROR_OVER_LIMIT);
     EXPECT_NE(reply.text().find("chain bit 31"), std::string::npos) << reply.text();
+}
+
+TEST_F(Link, a_start_by_edge_waits_for_it_and_counts_from_it) {
+    ASSERT_TRUE(load(program(18), 1).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_ARM, bytes_of(ols_arm{0, 2, {}})).error(), OLS_ERROR_BAD_PROGRAM);
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    board_host_genlock();
+    EXPECT_EQ(status().state, OLS_STATE_ARMED) << "an edge before the start means nothing";
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_run_us(50'000);
+    EXPECT_EQ(status().state, OLS_STATE_WAITING);
+    EXPECT_EQ(status().triggers_fired, 0u);
+    EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_BAD_STATE);
+    board_host_genlock();
+    board_host_run_us(2'000);
+    const ols_status_reply now = status();
+    EXPECT_EQ(now.state, OLS_STATE_PLAYING);
+    EXPECT_LE(now.now_ticks, 2'000u * 125);
+    board_host_run_us(20'000);
+    EXPECT_EQ(status().state, OLS_STATE_DONE);
+    EXPECT_EQ(status().triggers_fired, 18u);
+}
+
+TEST_F(Link, a_stage_that_waits_for_an_edge_can_be_stopped_and_ends_dark_like_one_that_plays) {
+    ASSERT_TRUE(load(program(18), 1).ok(OLS_LOAD_END));
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    ASSERT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
+    EXPECT_EQ(status().state, OLS_STATE_LOADED);
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_detach();
+    board_host_run_us(1'000);
+    board_host_attach();
+    expect_fault(OLS_FAULT_HOST_LOST);
 }
 
 TEST_F(Link, a_hang_is_a_fault_with_slot_after_the_reset) {

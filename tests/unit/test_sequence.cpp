@@ -268,6 +268,7 @@ TEST(Witness, counts_every_second_tick_in_every_path) {
     std::mt19937 random(6);
     PioBlock block;
     PioMachine witness{block, WITNESS_PROGRAM, WITNESS_WRAP_TARGET, WITNESS_WRAP};
+    witness.pc = WITNESS_WRAP_TARGET;
     for (int repeat = 0; repeat < 500; repeat++) {
         witness.x = random() % 3000;  // passes zero somewhere below, with the pin low or high or changing
         witness.pushed.clear();

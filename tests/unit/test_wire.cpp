@@ -83,6 +83,7 @@ TEST(Wire, hello_and_its_reply) {
     reply.slot_gap_ticks = 27;
     reply.lamps_lit_max = 171;
     reply.lamp_duty_max_permille = 750;
+    reply.edge_start_ticks = 7;
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 
@@ -103,7 +104,7 @@ TEST(Wire, loading) {
 }
 
 TEST(Wire, arm) {
-    expect_golden("arm", OLS_ARM, join(ols_arm{12500000}));
+    expect_golden("arm", OLS_ARM, join(ols_arm{12500000, OLS_START_BY_EDGE, {}}));
 }
 
 TEST(Wire, swap_reply) {

@@ -10,13 +10,14 @@ ERROR = 0x7F
 
 BASIS, TRACKING, MATTE, DARK = range(4)
 NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
-IDLE, LOADED, ARMED, PLAYING, DONE, FAULT = range(6)
+IDLE, LOADED, ARMED, PLAYING, DONE, FAULT, WAITING = range(7)
 FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory",
           "emergency stop", "over-temperature", "open lamp", "heartbeat")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHH")
-ARM_REQUEST = struct.Struct("<I")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI")
+ARM_REQUEST = struct.Struct("<IB3x")
+BY_COMMAND, BY_EDGE = range(2)
 STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
 SWAP_REPLY = struct.Struct("<IB3x")
 LOG_REPLY = struct.Struct("<IIIHH")
