@@ -81,7 +81,7 @@ static void play(void) {
         const struct ols_slot* const slot = &sequence_slots(sequence)[board.next_slot];
         if (sequence_triggers(sequence, slot) & 1) {
             const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks +
-                                  (uint64_t)(int64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
+                                  (uint64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
             board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
         }
         board.next_rise_ticks += slot->period_ticks;
@@ -221,7 +221,7 @@ static void begin_play(void) {
     board.waiting = false;
     board.playing = true;
     board.start_ticks = now_ticks();
-    board.next_rise_ticks = now_ticks() + SEQUENCE_LATCH_TICKS;
+    board.next_rise_ticks = now_ticks() + SLOT_LATCH_TICKS;
     board.next_slot = board.cycle = 0;
 }
 

@@ -55,7 +55,7 @@ void player_init(void) {
     PIO_SM_CLKDIV(PIO0_BASE, shifter.machine) = PIO_CLKDIV(BOARD_SHIFT_DIVIDER);
     PIO_SM_EXECCTRL(PIO0_BASE, shifter.machine) =
         PIO_EXEC_WRAP(SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET, SHIFTER_ORIGIN + SHIFTER_WRAP) |
-        PIO_EXEC_STATUS_TX_BELOW(sequence_pattern_words(BOARD_CHAIN_BITS));
+        PIO_EXEC_STATUS_TX_BELOW(slot_pattern_words(BOARD_CHAIN_BITS));
     PIO_SM_PINCTRL(PIO0_BASE, shifter.machine) = PIO_PINS_OUT(BOARD_PIN_DATA, 1) | PIO_PINS_SIDE(BOARD_PIN_CLK, 1);
 
     for (uint32_t n = 0; n < 2; n++) {

@@ -22,6 +22,7 @@ OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-e
 #define OLS_PAYLOAD_BYTES_MAX 1024  // of one frame
 #define OLS_SLOTS_MAX 1024          // of one program
 #define OLS_TRIGGERS 4              // TRIG0 to TRIG3
+#define OLS_PLANES_MAX 8            // of a grey slot
 #define OLS_CYCLES_MAX 524288       // of one program, when counted
 #define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
 #define OLS_LOG_ENTRIES_MAX 48      // of one reply
@@ -63,6 +64,7 @@ struct ols_hello {
 enum ols_capability {
     OLS_CAN_OFFSET_TRIGGERS = 1,  // triggers may have offsets, widths and polarities of their own
     OLS_CAN_START_BY_EDGE = 4,    // of GENLOCK
+    OLS_CAN_GREY = 8,             // slots may have planes
     OLS_CAN_SWAP = 2              // the next program can be loaded while one plays
 };
 
@@ -85,14 +87,14 @@ struct ols_hello_reply {
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
 struct ols_trigger {
     int32_t offset_ticks;  // of its rise, added to each slot's own; before the light when negative
-    uint32_t width_ticks;  // 0: the slot's exposure
+    uint32_t width_ticks;  // 0: from the slot's first light to its last
     uint8_t skip_kinds;    // bit k: does not fire in slots of kind k
     uint8_t active_low;    // 1: the pin idles high and is low while the camera is to expose
     uint16_t reserved;     // 0
 } OLS_PACKED_WORDS;
 
 // The program follows in chunks: slot_count times an ols_slot, then the patterns of all slots in the same order,
-// ceil(chain_bits / 32) words each.
+// ceil(chain_bits / 32) words each; those of a grey slot from the most significant plane to the least.
 struct ols_load_begin {
     uint16_t slot_count;  // 1..OLS_SLOTS_MAX
     uint16_t chain_bits;  // must be the board's
@@ -118,8 +120,9 @@ enum ols_slot_kind {
 struct ols_slot {
     uint8_t kind;                  // enum ols_slot_kind
     uint8_t trigger_mask;          // bit n: TRIGn
-    uint16_t reserved;             // 0
-    uint32_t exposure_ticks;       // of the light
+    uint8_t planes;                // bits of a lamp's level, 2 to 8, one pattern each; 0 or 1: on/off, one pattern
+    uint8_t reserved;              // 0
+    uint32_t exposure_ticks;       // of a lamp at its highest level; a multiple of 2^planes - 1
     uint32_t period_ticks;         // from this slot's light to the next slot's
     int32_t trigger_offset_ticks;  // from the light to the triggers, before it when negative
 } OLS_PACKED_WORDS;

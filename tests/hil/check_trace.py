@@ -5,8 +5,8 @@
 usage: check_trace.py TRACE.vcd PROGRAM.json
 
 PROGRAM.json holds {"cycles": n, "slots": [{"kind", "trigger_mask", "exposure_ticks", "period_ticks", "bits"}, ...]}:
-kind 3 is dark, bits are a list of 0 and 1 in chain order; a slot may have "trigger_offset_ticks", the program up to four
-"triggers" [{"offset_ticks", "width_ticks", "skip_kinds", "active_low"}, ...]. Prints JSON, errors in ticks of 8 ns.
+kind 3 is dark, bits are a list of 0 and 1 in chain order; a grey slot has "planes" and "levels" instead, and its
+"span_ticks"; a slot may have "trigger_offset_ticks", the program up to four "triggers" [{"offset_ticks", "width_ticks", "skip_kinds", "active_low"}, ...]. Prints JSON, errors in ticks of 8 ns.
 Exits with 1 if anything is wrong, or if sigrok-cli is not there to check.
 """
 import json
@@ -61,6 +61,13 @@ def latched_words(changes):
     return words
 
 
+def patterns(slot):
+    """A slot's words on the chain: its bits, or its levels' bits from the most significant plane on."""
+    if "levels" not in slot:
+        return [slot["bits"]]
+    return [[level >> plane & 1 for level in slot["levels"]] for plane in reversed(range(slot["planes"]))]
+
+
 def expected_slots(program):
     """Every slot that is played, in order, each with its start in ticks after the first."""
     start, slots = 0, []
@@ -77,7 +84,7 @@ def expected_pulses(program, slots, n):
     for slot in slots:
         if slot["trigger_mask"] >> n & 1 and not trigger.get("skip_kinds", 0) >> slot["kind"] & 1:
             rise = slot["start"] + slot.get("trigger_offset_ticks", 0) + trigger.get("offset_ticks", 0)
-            yield rise, rise + (trigger.get("width_ticks", 0) or slot["exposure_ticks"])
+            yield rise, rise + (trigger.get("width_ticks", 0) or slot.get("span_ticks", slot["exposure_ticks"]))
 
 
 def trigger_of(program, n):
@@ -88,12 +95,13 @@ def own_check(changes, program, slots):
     """Triggers, light and shift words as the edges have them, against the slots."""
     words = latched_words(changes)
     light = pulses(changes, "LIGHT_EN")
-    lit = [(slot["start"], slot["start"] + slot["exposure_ticks"]) for slot in slots if slot["kind"] != DARK]
+    lit = [flash for slot in slots if slot["kind"] != DARK for flash in expected_flashes(slot)]
     origin = light[0][0] - lit[0][0] if light and lit else words[0][0] + LATCH_TICKS
+    wrong = sum(fall - rise != ticks or begin not in (None, rise - origin)
+                for (rise, fall), (begin, ticks) in zip(light, lit))
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong([w for _, w in words], slots),
-              "light_pulses": len(light),
-              "light_pulses_wrong": sum((a - origin, b - origin) != pulse for (a, b), pulse in zip(light, lit)) +
-              abs(len(light) - len(lit)), "triggers": 0, "triggers_expected": 0}
+              "light_pulses": len(light), "light_pulses_wrong": wrong + abs(len(light) - len(lit)),
+              "triggers": 0, "triggers_expected": 0}
     periods, offsets, widths = [0], [0], [0]
     for n, name in enumerate(TRIGGERS):
         found = pulses(changes, name, trigger_of(program, n).get("active_low", 0))
@@ -109,14 +117,23 @@ def own_check(changes, program, slots):
     return report
 
 
+def expected_flashes(slot):
+    """(begin, ticks) of each stretch of light of a slot; where the later planes begin is the board's choice (None)."""
+    planes = slot.get("planes", 0) or 1
+    unit = slot["exposure_ticks"] // (2**planes - 1)
+    for plane in range(planes):
+        yield None if plane else slot["start"], unit << (planes - 1 - plane)
+
+
 def count_wrong(words, slots):
-    """Words that are not their slot's bits, missing and surplus words among them."""
-    return sum(word != slot["bits"] for word, slot in zip(words, slots)) + abs(len(words) - len(slots))
+    """Words that are not their slot's patterns, missing and surplus words among them."""
+    wanted = [pattern for slot in slots for pattern in patterns(slot)]
+    return sum(word != pattern for word, pattern in zip(words, wanted)) + abs(len(words) - len(wanted))
 
 
 def sigrok_check(path, program, slots):
     """The same from sigrok's SPI and timing decoders, which know nothing of us; the chain must be whole bytes long."""
-    if len(slots[0]["bits"]) % 8:
+    if len(patterns(slots[0])[0]) % 8:
         return {"error": "the chain is not whole bytes long, which sigrok's SPI decoder needs"}
     if shutil.which("sigrok-cli") is None:
         return {"error": "sigrok-cli is not installed"}

@@ -54,8 +54,8 @@ void expect_golden(const char* name, uint16_t type, const Bytes& payload) {
 constexpr uint64_t hash = 0x0123456789abcdef;
 
 struct TwoSlots {
-    ols_slot slots[2] = {{OLS_TRACKING, 3, 0, 6250, 57870, -500}, {OLS_DARK, 1, 0, 51500, 57870, 0}};
-    uint32_t patterns[2][6] = {{~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}, {}};
+    ols_slot slots[2] = {{OLS_TRACKING, 3, 8, 0, 51000, 57870, -500}, {OLS_DARK, 1, 0, 0, 51500, 57870, 0}};
+    uint32_t patterns[8 + 1][6] = {{~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}, {}, {}, {}, {}, {}, {}, {1u << 31}, {}};
 };
 
 TEST(Wire, messages_without_payload) {
