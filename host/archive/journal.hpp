@@ -5,7 +5,7 @@
 //   {"event":"begin","version":1,"lights":{"bytes":..,"crc32":".."}}
 //   {"event":"target","camera":0,"index":0,"file":"cam0/target_000000.exr","bytes":..,"crc32":"..","provenance":{..}}
 //   {"event":"missing","camera":0,"index":1,"why":"..","detail":{..}}
-//   {"event":"end","finished":1,"missing":1,"manifest":{"bytes":..,"crc32":".."}}
+//   {"event":"end","written":1,"missing":1,"manifest":{"bytes":..,"crc32":".."}}
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -129,13 +129,14 @@ Result<Target> ArchiveReader::read_box(uint32_t camera, uint32_t index, const Bo
 }
 
 Verification ArchiveReader::verify() const {
-    const auto& [root, manifest, info, journal] = *state_;
+    const fs::path& root = state_->root;
+    const Journal& journal = state_->journal;
     Verification result;
     for (const auto& entry : journal.targets) {
         if (entry.file.empty()) continue;
         std::string problem = damage(root, entry.file, {entry.bytes, entry.crc32});
         if (problem.empty()) {
-            const auto head = read_target_head((root / entry.file).string(), info);
+            const auto head = read_target_head((root / entry.file).string(), state_->info);
             if (!head) problem = entry.file + ": " + head.error().message;
         }
         if (problem.empty())

@@ -163,9 +163,8 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
 
     Imf::MultiPartOutputFile file(stream, headers.data(), int(headers.size()));
     Imf::TiledOutputPart lamps(file, 0);
-    const auto written = info.sample_type == SampleType::half_float
-                             ? write_lamps<half>(lamps, head, channels, source, mask)
-                             : write_lamps<float>(lamps, head, channels, source, mask);
+    auto written = info.sample_type == SampleType::half_float ? write_lamps<half>(lamps, head, channels, source, mask)
+                                                              : write_lamps<float>(lamps, head, channels, source, mask);
     if (!written) return written;
     write_plane(Imf::TiledOutputPart(file, 1), Imf::UINT, mask.data(), head);
     if (!head.variance.empty()) write_plane(Imf::TiledOutputPart(file, 2), Imf::FLOAT, head.variance.data(), head);
@@ -218,8 +217,8 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
     target.cfa = Cfa(found - std::begin(cfa_names));
     for (const auto& channel : plane_channels(int(info.lights.size()), target.cfa))
         if (!header.channels().findChannel(channel))
-            return fail("'" + path + "' has no layer '" + channel + "', but the manifest lists that lamp");
-    const Imath::Box2i window = header.dataWindow();
+            return fail(fmt::format("'{}' has no layer '{}', but the manifest lists that lamp", path, channel));
+    const Imath::Box2i& window = header.dataWindow();
     if (window.min != Imath::V2i(0, 0)) return fail("'" + path + "' has a data window that does not begin at 0, 0");
     target.width = window.max.x + 1;
     target.height = window.max.y + 1;

@@ -2,8 +2,9 @@
 // ArchiveWriter: every step leaves an archive that reads, whatever happens next.
 #include <fmt/format.h>
 
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
-#include <regex>
 #include <set>
 
 #include "archive/archive.hpp"
@@ -27,11 +28,14 @@ struct ArchiveWriter::State {
 
 namespace {
 
-// Whether a file is one that an archive consists of, by its path relative to the archive.
-bool belongs_to_archive(const std::string& relative) {
-    static const std::regex names(
-        "(manifest\\.json|lights\\.lp|cam[0-9]+/target_[0-9]+\\.exr)(\\.part)?|journal\\.jsonl|cam[0-9]+");
-    return std::regex_match(relative, names);
+// Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive.
+bool belongs_to_archive(std::string relative) {
+    if (relative.ends_with(unfinished_suffix)) relative.resize(relative.size() - std::strlen(unfinished_suffix));
+    unsigned camera = 0, index = 0;
+    const int numbers = std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index);
+    if (numbers == 2) return relative == target_file_name(camera, index);
+    if (numbers == 1) return relative == fmt::format("cam{}", camera);
+    return relative == manifest_name || relative == lights_name || relative == journal_name;
 }
 
 Status remove_archive(const fs::path& root) {
@@ -136,12 +140,12 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
     const fs::path final_name = state.root / relative, temporary = final_name.string() + unfinished_suffix;
     std::error_code error;
     if (fs::create_directory(final_name.parent_path(), error))
-        if (const auto synced = sync_directory(state.root.string()); !synced) return synced;
+        if (auto s = sync_directory(state.root.string()); !s) return s;
     if (error) return fail("cannot make '" + final_name.parent_path().string() + "': " + error.message());
 
     if (auto s = write_target_file(temporary.string(), state.info, head, source); !s) return s;
     const auto sum = checksum_file(temporary.string());
-    const Status renamed = sum.ok() ? rename_durably(temporary.string(), final_name.string()) : sum.error();
+    Status renamed = sum.ok() ? rename_durably(temporary.string(), final_name.string()) : sum.error();
     if (!renamed) {
         fs::remove(temporary, error);
         return renamed;

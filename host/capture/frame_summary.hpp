@@ -24,7 +24,8 @@ FrameSummary summarize_frame(const Frame& frame, double black_counts, const Nois
 bool is_dark(const FrameSummary& summary);
 constexpr float black_drift_counts = 1;
 
-// sum |a - b| / max(sum |a|, sum |b|): 0 for equal summaries, 1 for images that share no lit block, up to 2.
+// sum |a - b| / max(sum |a|, sum |b|): 0 for equal summaries, 1 when one is black, 2 for images of one
+// brightness that share no lit block.
 double difference(const FrameSummary& a, const FrameSummary& b);
 
 }  // namespace ols

@@ -95,8 +95,7 @@ void FramePlacer::begin_stretch(FrameWitness frame, const std::string& gap) {
 // Adds a frame to the stretch if its time lies on the grid and the sequence has a trigger there.
 bool FramePlacer::append(FrameWitness& frame) {
     const auto steps = grid_->steps_to(frame.stamp.timestamp_ns);
-    const uint64_t base = locked_ ? first_counter_ : next_counter_;
-    if (!steps || base + last_position_ + *steps >= trigger_count_) return false;
+    if (!steps || lowest_first_counter() + last_position_ + *steps >= trigger_count_) return false;
     grid_->advance(*steps, frame.stamp.timestamp_ns);
     const bool restarted = frame.epoch != last_epoch_;
     const uint64_t id_steps = frame.stamp.frame_id - last_stamp_.frame_id;
@@ -156,6 +155,7 @@ void FramePlacer::give_up_oldest(size_t count, const std::string& why) {
     for (; count > 0 && !unlocked_.empty(); --count) {
         refuse(unlocked_.front().frame, why);
         unlocked_.pop_front();
+        if (!unlocked_.empty()) unlocked_.front().gap = why;
     }
 }
 
@@ -226,9 +226,9 @@ uint64_t FramePlacer::lowest_open() const {
     return waiting_.empty() ? next_counter_ : counter_of(waiting_.front());
 }
 
-std::optional<uint64_t> FramePlacer::time_of_ns(uint64_t counter) const {
-    if (!locked_) return std::nullopt;
-    return grid_->time_after_ns(int64_t(counter) - int64_t(first_counter_ + last_position_));
+std::optional<uint64_t> FramePlacer::latest_time_of_ns(uint64_t counter) const {
+    if (!grid_) return std::nullopt;
+    return grid_->time_after_ns(int64_t(counter) - int64_t(lowest_first_counter() + last_position_));
 }
 
 std::optional<double> FramePlacer::drift_ppm() const {

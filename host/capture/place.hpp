@@ -59,8 +59,9 @@ class FramePlacer {
 
     bool locked() const { return locked_; }
 
-    // When a trigger is due on the camera's clock; nothing before the lock.
-    std::optional<uint64_t> time_of_ns(uint64_t counter) const;
+    // When a trigger is due on the camera's clock: exact when locked, otherwise the latest that is possible, as if no
+    // trigger before the stretch had been missed. Nothing before the first frame.
+    std::optional<uint64_t> latest_time_of_ns(uint64_t counter) const;
     std::optional<double> drift_ppm() const;  // of the camera's clock against the board's, when locked
     uint64_t duplicates() const { return duplicates_; }
     uint64_t camera_restarts() const { return camera_restarts_; }
@@ -86,6 +87,8 @@ class FramePlacer {
     void accept_waiting();
     void refuse_waiting(const std::string& why);
     void refuse(const FrameWitness& frame, const std::string& why);
+    // The counter of position 0, or the least that it can be.
+    uint64_t lowest_first_counter() const { return locked_ ? first_counter_ : next_counter_; }
     uint64_t counter_of(const Pending& pending) const { return first_counter_ + pending.position; }
 
     const uint64_t trigger_count_;

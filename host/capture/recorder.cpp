@@ -47,7 +47,7 @@ bool is_whole(const Frame& frame, const CameraConfig& config) {
     return frame.width == uint32_t(config.width) && frame.height == uint32_t(config.height) &&
            frame.cfa == config.cfa &&
            frame.pitch_bytes >= frame.width * size_t(samples_per_pixel(frame.cfa)) * sample_bytes &&
-           frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
+           frame.pitch_bytes % sample_bytes == 0 && frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
 }
 
 std::string describe(const Frame& frame) {
@@ -171,7 +171,7 @@ class Recording {
     // By the camera's own word: its watermark is past the last trigger that was fired.
     bool has_delivered_all(uint64_t watermark_ns) const {
         if (fired_ == 0) return true;
-        const auto last_ns = identifier_.placer().time_of_ns(fired_ - 1);
+        const auto last_ns = identifier_.placer().latest_time_of_ns(fired_ - 1);
         return last_ns && watermark_ns > *last_ns;
     }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <numeric>
 #include <thread>
@@ -112,6 +113,11 @@ class TakeWriter {
             if (target.ok()) {
                 outcome.target = std::make_unique<Target>(std::move(*target));
                 outcome.target->index = frames->cycle;
+                const auto& mask = outcome.target->mask;
+                const auto saturated =
+                    std::count_if(mask.begin(), mask.end(), [](uint32_t m) { return (m & mask_saturated) != 0; });
+                outcome.detail["saturated_pixels"] = saturated;
+                report_.saturated_share = std::max(report_.saturated_share, double(saturated) / double(mask.size()));
                 outcome.target->provenance = outcome.detail;
             } else {
                 outcome.why = target.error().message;
@@ -174,10 +180,14 @@ std::optional<double> measured_black(const Calibration& calibration) {
 
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
                             const Calibration& calibration, ArchiveWriter& archive, const std::atomic<bool>& stop,
+                            const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress) {
     const auto start = Clock::now();
     TakeWriter writer(sequence, stage, calibration, archive);
-    const RecordSink sink{[&](std::shared_ptr<const Frame> frame) { writer.add_frame(std::move(frame)); },
+    const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
+                              identified(*frame);
+                              writer.add_frame(std::move(frame));
+                          },
                           [&](const MissingSlot& slot) { writer.add_missing(slot); },
                           [&](uint64_t decided, uint64_t total) {
                               writer.hand_on(decided);

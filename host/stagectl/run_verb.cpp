@@ -2,6 +2,8 @@
 // stagectl run: plays a sequence and records the take.
 #include <fmt/format.h>
 
+#include <fstream>
+
 #include "capture/take.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -12,7 +14,7 @@ namespace {
 
 struct Options {
     LinkOptions links;
-    std::string sequence, output, calibration;
+    std::string sequence, output, calibration, frames;
     TakeInfo slate;
     int cycles = 0;
     bool nominal = false, overwrite = false, single_float = false, json = false;
@@ -53,6 +55,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"targets_written", report.targets_written},
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
+            {"saturated_share", report.saturated_share},
             {"seconds",
              {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
 }
@@ -67,10 +70,30 @@ void print_report(const TakeReport& report, const Options& options) {
     if (!record.unfit_frame.empty())
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);
+    if (report.saturated_share > 0)
+        fmt::print(stderr,
+                   "stagectl: {:.2g} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
+                   report.saturated_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (record.slots_missing > 0)
         fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
                    options.output);
+}
+
+// The account of identified frames, a JSON line each.
+Result<std::ofstream> open_account(const std::string& path) {
+    std::ofstream file;
+    if (!path.empty()) file.open(path);
+    if (!path.empty() && !file) return fail("cannot write '" + path + "': check that its folder exists");
+    return file;
+}
+
+void add_to_account(std::ofstream& account, const Frame& frame) {
+    if (!account.is_open()) return;
+    account << fmt::format(R"({{"camera":{},"frame_id":{},"timestamp_ns":{},"cycle":{},"slot":{},"tick":{}}})",
+                           frame.camera, frame.stamp.frame_id, frame.stamp.timestamp_ns, frame.cycle, frame.slot,
+                           frame.tick)
+            << '\n';
 }
 
 Result<int> run(const Options& options) {
@@ -83,14 +106,17 @@ Result<int> run(const Options& options) {
     if (!sequence.ok()) return sequence.error();
     const auto calibration = open_calibration(options, *stage);
     if (!calibration.ok()) return calibration.error();
+    auto account = open_account(options.frames);
+    if (!account.ok()) return account.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
     auto archive = ArchiveWriter::create(options.output, describe_take(options, *sequence, *stage), options.overwrite);
     if (!archive.ok()) return archive.error();
 
-    const auto report =
-        run_take(*session->board, *session->camera, *sequence, *stage, *calibration, *archive, stop_on_signal(),
-                 [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
+    const auto report = run_take(
+        *session->board, *session->camera, *sequence, *stage, *calibration, *archive, stop_on_signal(),
+        [&](const Frame& frame) { add_to_account(*account, frame); },
+        [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
     if (!report.ok()) return report.error();
     print_report(*report, options);
     if (options.json) fmt::print("{}\n", to_json(*report, options).dump(1));
@@ -116,6 +142,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
         ->check(CLI::Range(1, 1'000'000));
     verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();
+    verb->add_option("--frames", options->frames, "file for a JSON line a frame: its id and time, its cycle and slot");
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");

@@ -43,6 +43,14 @@ Summary summarize(const Sequence& sequence, const StageConfig& stage) {
     return summary;
 }
 
+// The numbers of the lamps that a slot lights.
+std::vector<int> lit_lamps(const Slot& slot) {
+    std::vector<int> lamps;
+    for (size_t lamp = 0; lamp < slot.lit.size(); ++lamp)
+        if (slot.lit[lamp]) lamps.push_back(int(lamp));
+    return lamps;
+}
+
 nlohmann::json to_json(const Summary& summary, const Sequence& sequence) {
     auto lamps = nlohmann::json::array();
     for (const LampLight& lamp : summary.flicker.lamps)
@@ -52,7 +60,7 @@ nlohmann::json to_json(const Summary& summary, const Sequence& sequence) {
     for (const Slot& slot : sequence.slots)
         slots.push_back({{"kind", slot_kind_name(slot.kind)},
                          {"row", slot.row},
-                         {"lit", std::count(slot.lit.begin(), slot.lit.end(), 1)},
+                         {"lit", lit_lamps(slot)},
                          {"exposure_ticks", slot.exposure_ticks},
                          {"period_ticks", slot.period_ticks},
                          {"trigger_mask", slot.trigger_mask}});

@@ -34,7 +34,7 @@ def ramp_program(hello, cycles=1):
 
 def light_of_lamps(changes):
     """Ticks of light for each lamp, one list for each TRIG0 pulse, from the edges of LATCH, LIGHT_EN and the chain."""
-    words = check_trace.latched_words(changes)
+    words = check_trace.latched_words(changes, CHAIN_BITS)
     light = check_trace.pulses(changes, "LIGHT_EN")
     slots = []
     for rise, fall in check_trace.pulses(changes, "TRIG0"):

@@ -86,6 +86,26 @@ TEST_F(Archive, a_box_of_a_target_is_what_lies_there_in_the_whole) {
     }
 }
 
+// 3000 lamps fill the block that a writer holds with two tiles.
+TEST_F(Archive, targets_of_more_lamps_than_a_block_holds_come_back) {
+    auto writer = ArchiveWriter::create(path, take_info(3000));
+    const Target target = numbered_target(3000, 200, 10, Cfa::none, 0);
+    ASSERT_TRUE(writer->write_target(target).ok());
+    const auto back = ArchiveReader::open(path)->read_target(0, 0);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    EXPECT_EQ(back->lamps, target.lamps);
+}
+
+TEST_F(Archive, the_same_take_gives_the_same_bytes) {
+    for (const auto& copy : {path, path + "2"}) {
+        auto writer = ArchiveWriter::create(copy, take_info(3));
+        ASSERT_TRUE(writer->write_target(numbered_target(3, 130, 70, Cfa::rggb, 0)).ok());
+        ASSERT_TRUE(writer->note_missing_target(0, 1, "lost").ok());
+        ASSERT_TRUE(writer->finish().ok());
+    }
+    EXPECT_EQ(output_of("diff -r '" + path + "' '" + path + "2'"), "");
+}
+
 TEST_F(Archive, what_half_floats_cannot_hold_is_clamped_and_masked_and_never_inf) {
     auto writer = ArchiveWriter::create(path, take_info(1));
     Target target = numbered_target(1, 4, 1, Cfa::none, 0);
@@ -204,7 +224,13 @@ TEST_F(Archive, an_existing_path_is_refused_and_only_an_archive_is_overwritten) 
     const auto refused = ArchiveWriter::create(path, take_info(1));
     ASSERT_FALSE(refused.ok());
     EXPECT_NE(refused.error().message.find(path), std::string::npos);
+    {
+        auto overwritten = ArchiveWriter::create(path, take_info(1), true);
+        ASSERT_TRUE(overwritten->write_target(numbered_target(1, 8, 8, Cfa::none, 0)).ok());
+        std::ofstream(path + "/cam0/target_000001.exr.part") << "interrupted";
+    }
     EXPECT_TRUE(ArchiveWriter::create(path, take_info(1), true).ok());
+    EXPECT_FALSE(std::filesystem::exists(path + "/cam0"));
 
     std::ofstream(path + "/my notes.txt") << "keep me";
     const auto stranger = ArchiveWriter::create(path, take_info(1), true);

@@ -86,7 +86,7 @@ Take record(SyntheticStage& stage) {
     for (uint32_t n = 0; n < take.triggers; ++n) {
         const size_t slot = n % sequence.slots.size();
         const uint64_t rise_ticks = 1000 + uint64_t(n) * sequence.slots[0].period_ticks;
-        take.log.push_back({rise_ticks & ~1ull, n, uint32_t(n / sequence.slots.size()), uint16_t(slot), 1});
+        take.log.push_back({rise_ticks & ~1ull, n, uint32_t(n / sequence.slots.size()), uint16_t(slot), 1, 0});
         FrameWitness witness;
         witness.stamp.frame_id = n + 1;
         witness.stamp.timestamp_ns = clock_offset_ns + uint64_t(double(rise_ticks) * 8 * (1 + clock_drift));
@@ -392,4 +392,22 @@ TEST(Identify, an_unsteady_subject_keeps_its_lock) {
     const Outcome outcome = play(take, stage.sequence);
     EXPECT_EQ(outcome.mislabelled, 0);
     EXPECT_TRUE(outcome.missing.empty());
+}
+
+TEST(TriggerGrid, drift_is_measured_and_times_between_triggers_are_refused) {
+    const double period_ns = 462'960, drift = 40e-6;
+    const auto time = [&](uint64_t n) { return uint64_t(5e9 + double(n) * period_ns * (1 + drift)); };
+    TriggerGrid grid(period_ns, time(0), 180);
+    for (uint64_t n = 1; n <= 400; ++n) {
+        ASSERT_EQ(grid.steps_to(time(n)), 1u);
+        grid.advance(1, time(n));
+    }
+    EXPECT_NEAR(grid.drift_ppm(), 40, 0.1);
+    // A pause of ten seconds: 400 us of drift would be a trigger's width if it were not known.
+    EXPECT_EQ(grid.steps_to(time(22000)), 21600u);
+    EXPECT_EQ(TriggerGrid(period_ns, time(400), 180).steps_to(time(22000)), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(401) + 30'000), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(400)), std::nullopt);
+    EXPECT_EQ(grid.steps_to(time(399)), std::nullopt);
+    EXPECT_NEAR(double(grid.time_after_ns(-3)), double(time(397)), 2);
 }

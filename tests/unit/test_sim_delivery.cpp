@@ -52,7 +52,7 @@ class CardStage : public testing::Test {
         const ols::Setup setup{scene_, stage_, stage_.cameras[0], camera_model};
         auto ring = RingWriter::create(folder_ / "cam0.ring", 32, frame_bytes(setup, {}));
         auto reader = RingReader::open(folder_ / "cam0.ring");
-        VirtualCamera camera(setup, {}, 0, std::move(*ring), faults, true, cancelled_);
+        VirtualCamera camera(setup, {}, 0, std::move(*ring), truth_path(), faults, true, cancelled_);
         for (int i = 0; i < triggers; ++i) camera.expose(exposure(10000 + uint64_t(i) * 2000));
         camera.set_now(10000 + uint64_t(triggers) * 2000);
         camera.finish();
@@ -62,6 +62,8 @@ class CardStage : public testing::Test {
         watermark_ns_ = reader->watermark_ns();
         return frames;
     }
+
+    std::string truth_path() const { return folder_ / "cam0.frames.jsonl"; }
 
     static ExposureMessage exposure(uint64_t rise) {
         ExposureMessage message;
@@ -133,6 +135,17 @@ TEST(Faults, a_frozen_frame_shows_the_one_before_and_a_short_one_lacks_two_rows)
     EXPECT_EQ(frames[2].height, 2u);
     EXPECT_EQ(frames[2].samples.size(), 4u);
     EXPECT_EQ(frames[3].samples, numbered(3).samples);
+}
+
+TEST_F(CardStage, the_truth_of_each_frame_names_its_trigger_and_lamps) {
+    play(2, {});
+    std::ifstream file(truth_path());
+    std::string first, second;
+    std::getline(file, first);
+    std::getline(file, second);
+    // The clock adds 1000 ns and 2000 ppm to ticks of 8 ns: 80000 * 1.002 + 1000, 96000 * 1.002 + 1000.
+    EXPECT_EQ(first, R"({"frame_id":1,"timestamp_ns":81160,"trigger":0,"tick":10000,"lit":[0]})");
+    EXPECT_EQ(second, R"({"frame_id":2,"timestamp_ns":97192,"trigger":1,"tick":12000,"lit":[0]})");
 }
 
 TEST_F(CardStage, frames_arrive_with_ids_from_one_the_cameras_time_and_the_light_of_their_exposure) {

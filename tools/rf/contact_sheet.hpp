@@ -25,11 +25,12 @@ class ContactSheet {
     // `image_width` by `image_height` pixels are what add() will get.
     ContactSheet(const std::vector<LightPosition>& lights, int image_width, int image_height);
 
-    // Keeps a small copy of a lamp's scene-linear R G B image.
+    // Keeps a smaller copy of a lamp's scene-linear R G B image.
     void add(int lamp, const Image& rgb);
 
-    // One exposure for all, so that lamps compare: the brightest half percent of all pixels goes beyond 0.9, plus
-    // `exposure_ev`. R G B, 8-bit sRGB through tone_curve (image/tone.hpp); `title` stands at the top.
+    // R G B, 8-bit sRGB through tone_curve (image/tone.hpp). One exposure for all, so that lamps compare: the brightest
+    // half percent of all pixels goes beyond 0.9, plus `exposure_ev`. All are cut to the smallest box that holds what
+    // any lamp shows brighter than a thirtieth of that, with a margin. `title` stands at the top.
     struct Picture {
         int width = 0, height = 0;
         std::vector<uint8_t> rgb8;
@@ -39,8 +40,8 @@ class ContactSheet {
 
   private:
     std::vector<SheetCell> cells_;
-    int thumb_width_, thumb_height_;
-    std::vector<Image> thumbs_;
+    int kept_width_, kept_height_;
+    std::vector<Image> kept_;
 };
 
 }  // namespace ols

@@ -141,7 +141,8 @@ void add_export_verb(CLI::App& app, int& exit_code) {
         ->type_name("N");
     verb->add_option("--camera", options->camera, "camera of the target")->type_name("N");
     verb->add_option("--exposure", options->exposure_ev, "stops to brighten by")->type_name("EV");
-    verb->add_option("--contact-sheet", options->contact_sheet, "PNG of all lamp images, placed as the lamps hang");
+    verb->add_option("--contact-sheet", options->contact_sheet,
+                     "PNG of all lamp images, cut to the subject, placed as the lamps hang");
     verb->callback([options, &exit_code] {
         const auto status = run(*options);
         if (status) return;

@@ -34,6 +34,7 @@ void Renderer::place(double time_us) {
 
     poses_ = std::move(poses);
     images_.reset();
+    sums_.forget();
     {
         const Stopwatch stopwatch(cost_.build_s);
         geometry_ = std::make_unique<Geometry>(setup_.scene, time_us);
@@ -59,6 +60,7 @@ void Renderer::render(const std::vector<uint32_t>& lamps) {
 
 Image Renderer::light(const std::vector<Float3>& weights, double time_us) {
     place(time_us);
+    if (const Image* sum = sums_.find(weights)) return *sum;
     std::vector<uint32_t> lit;
     for (uint32_t i = 0; i < lamps_.size(); ++i)
         if (!(weights[i] == Float3{})) lit.push_back(i);
@@ -66,6 +68,7 @@ Image Renderer::light(const std::vector<Float3>& weights, double time_us) {
     const Stopwatch stopwatch(cost_.sums_s);
     Image sum(setup_.camera.width, setup_.camera.height, channels());
     images_->add_weighted(weights, sum);
+    sums_.remember(weights, sum);
     return sum;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "lamp_images.hpp"
+#include "light_sums.hpp"
 
 namespace ols {
 
@@ -50,6 +51,7 @@ class Renderer {
     std::vector<Pose> poses_;  // of the placing that geometry_ and images_ hold
     std::unique_ptr<Geometry> geometry_;
     std::unique_ptr<LampImages> images_;
+    LightSums sums_{size_t(768) << 20};  // a cycle of 180 pictures of 640 x 480 in colour
     Cost cost_;
 };
 

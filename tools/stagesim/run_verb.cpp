@@ -109,8 +109,9 @@ class StageRun {
         if (!ring) return ring.error();
         foretold_.push_back(foretell(*setups_.back(), options_.inputs.disabled_set()));
         cameras_.push_back(std::make_unique<VirtualCamera>(*setups_.back(), options_.inputs.disabled_set(), index,
-                                                           std::move(*ring), faults, options_.pace == "virtual",
-                                                           cancelled_));
+                                                           std::move(*ring),
+                                                           fmt::format("{}/cam{}.frames.jsonl", options_.work, index),
+                                                           faults, options_.pace == "virtual", cancelled_));
         Renderer& renderer = cameras_.back()->renderer();
         // The board starts when the lamps are done: its socket says that the stage is ready.
         if (!renderer.effects().movement())
@@ -233,7 +234,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<RunOptions>();
     CLI::App* verb = app.add_subcommand("run", "play the stage: emulated board, lamps, cameras");
     verb->footer(
-        "Makes WORK/board.sock (the board's USB), WORK/cam0.ring (frames) and, at the end, WORK/cost.json.\n"
+        "Makes WORK/board.sock (the board's USB), WORK/cam0.ring (frames), WORK/cam0.frames.jsonl (which trigger and "
+        "lamps made each frame: the truth that identification is held against) and, at the end, WORK/cost.json.\n"
         "example: stagesim run tools/stagesim/scenes/head.toml --stage examples/stage.toml --work out/stage --once");
     add_input_options(*verb, options->inputs);
     verb->add_option("--work", options->work, "folder of sockets and rings")->required();

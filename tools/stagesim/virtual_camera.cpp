@@ -2,6 +2,8 @@
 // From exposures to stamped frames.
 #include "virtual_camera.hpp"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -45,11 +47,13 @@ uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled) 
 }
 
 VirtualCamera::VirtualCamera(const Setup& setup, const std::set<std::string>& disabled, uint32_t index, RingWriter ring,
-                             const std::vector<Fault>& faults, bool wait_for_reader, const std::atomic<bool>& cancelled)
+                             const std::string& frames_path, const std::vector<Fault>& faults, bool wait_for_reader,
+                             const std::atomic<bool>& cancelled)
     : setup_(setup),
       renderer_(setup, disabled),
       index_(index),
       ring_(std::move(ring)),
+      frames_file_(frames_path),
       delivery_(faults, index),
       wait_for_reader_(wait_for_reader),
       cancelled_(cancelled),
@@ -65,11 +69,25 @@ void VirtualCamera::expose(const ExposureMessage& message) {
     if (delivery_.strikes(FaultKind::drop_trigger, trigger)) return;
 
     const double middle_us = (double(message.rise - first_rise_) + double(message.fall - first_rise_)) / 2;
-    const Exposure exposure =
-        renderer_.expose(lit_microseconds(message, setup_.stage), middle_us * microseconds_per_tick, trigger, index_);
+    const std::vector<double> lit_us = lit_microseconds(message, setup_.stage);
+    const Exposure exposure = renderer_.expose(lit_us, middle_us * microseconds_per_tick, trigger, index_);
     Frame frame = make_frame(exposure, setup_.camera, renderer_.effects());
     frame.stamp = {next_frame_id_++, camera_time_ns(clock_, message.rise - clock_epoch_tick_)};
+    write_truth(frame.stamp, trigger, message.rise, lit_us);
     delivery_.send(std::move(frame), trigger, [this](Frame f) { deliver(std::move(f)); });
+}
+
+void VirtualCamera::write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick,
+                                const std::vector<double>& lit_us) {
+    frames_file_ << fmt::format(R"({{"frame_id":{},"timestamp_ns":{},"trigger":{},"tick":{},"lit":[)", stamp.frame_id,
+                                stamp.timestamp_ns, trigger, tick);
+    const char* comma = "";
+    for (size_t lamp = 0; lamp < lit_us.size(); ++lamp) {
+        if (lit_us[lamp] == 0) continue;
+        frames_file_ << comma << lamp;
+        comma = ",";
+    }
+    frames_file_ << "]}\n" << std::flush;
 }
 
 void VirtualCamera::deliver(Frame frame) {

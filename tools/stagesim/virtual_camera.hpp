@@ -4,7 +4,9 @@
 #pragma once
 
 #include <atomic>
+#include <fstream>
 #include <memory>
+#include <string>
 
 #include "board_messages.hpp"
 #include "device/ring.hpp"
@@ -26,8 +28,11 @@ uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled);
 class VirtualCamera {
   public:
     // `setup` must outlive the camera.
+    // `frames_path` is a file of JSON lines, one a frame, that says what the host must find out: which trigger made it
+    // and which lamps of the stage were lit.
     VirtualCamera(const Setup& setup, const std::set<std::string>& disabled, uint32_t index, RingWriter ring,
-                  const std::vector<Fault>& faults, bool wait_for_reader, const std::atomic<bool>& cancelled);
+                  const std::string& frames_path, const std::vector<Fault>& faults, bool wait_for_reader,
+                  const std::atomic<bool>& cancelled);
 
     Renderer& renderer() { return renderer_; }
     // Steps for an exposure of this camera's trigger; scene time is counted from the first trigger.
@@ -43,11 +48,13 @@ class VirtualCamera {
 
   private:
     void deliver(Frame frame);
+    void write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick, const std::vector<double>& lit_us);
 
     const Setup& setup_;
     Renderer renderer_;
     uint32_t index_;
     RingWriter ring_;
+    std::ofstream frames_file_;
     FaultyDelivery delivery_;
     bool wait_for_reader_;
     const std::atomic<bool>& cancelled_;

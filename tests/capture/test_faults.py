@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""Faults on the way from the lamps to the archive, in every kind of slot: what the manifest must say, and that not one
+sample of the archive differs from the take without faults but where the manifest says so. The virtual camera's noise is
+keyed by trigger, so that a mislabelled frame cannot hide."""
+import numpy as np
+import pytest
+
+from virtual_take import (
+    VirtualStage,
+    identification,
+    manifest,
+    missing_triggers,
+    read_lamps,
+    sequence,
+    slots_of,
+    target_file,
+)
+
+CYCLES = 3
+CYCLE = 180
+
+
+def find_slot(kind, nth):
+    """The trigger of the n-th slot of a kind in the second cycle."""
+    return CYCLE + [i for i, slot in enumerate(slots_of("single")) if slot["kind"] == kind][nth]
+
+
+STRUCK = {kind: find_slot(kind, nth) for kind, nth in {"tracking": 2, "matte": 4, "dark": 2, "basis": 120}.items()}
+
+
+def record(folder, faults, *stage_options, basis="single", cycles=CYCLES, code=0):
+    text = "".join(
+        "[[fault]]\n" + "".join(f"{key} = {value!r}\n" for key, value in fault.items()) for fault in faults
+    ).replace("True", "true").replace("False", "false")
+    folder.mkdir(parents=True)
+    (folder / "faults.toml").write_text(text)
+    options = ["--inject", folder / "faults.toml"] if faults else []
+    archive = folder / "take.rfa"
+    with VirtualStage(folder / "work", "spheres.toml", *options, *stage_options) as stage:
+        report = stage.stagectl(
+            "run", "--sequence", sequence(basis), "--nominal", "--cycles", cycles, "-o", archive, "--json", code=code
+        )
+    return archive, report
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    archive, report = record(tmp_path_factory.mktemp("clean") / "take", [])
+    assert report["slots_missing"] == 0 and report["targets_written"] == CYCLES
+    return archive
+
+
+def expect_same(archive, clean, index, missing_lamps=()):
+    if not missing_lamps:
+        assert target_file(archive, index).read_bytes() == target_file(clean, index).read_bytes()
+        return
+    lamps, truth = read_lamps(archive, index), read_lamps(clean, index)
+    for lamp in range(len(truth)):
+        assert np.array_equal(lamps[lamp], 0 * truth[lamp] if lamp in missing_lamps else truth[lamp]), lamp
+
+
+@pytest.mark.parametrize(
+    "fault, lost",
+    [
+        ({"kind": "drop_frame"}, True),
+        ({"kind": "drop_trigger"}, True),
+        ({"kind": "wrong_size"}, True),
+        ({"kind": "late", "by": 40}, True),
+        ({"kind": "duplicate"}, False),
+        ({"kind": "late", "by": 10}, False),
+        ({"kind": "swap"}, False),
+        ({"kind": "restart_camera", "keep_clock": True}, False),
+    ],
+    ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
+)
+def test_a_fault_costs_its_own_slot_at_most_in_every_kind_of_slot(tmp_path, clean, fault, lost):
+    faults = [{**fault, "trigger": trigger} for trigger in STRUCK.values()]
+    archive, report = record(tmp_path / "take", faults, code=2 if lost else 0)
+    assert missing_triggers(archive) == (set(STRUCK.values()) if lost else set())
+    assert report["duplicates"] == (len(STRUCK) if fault["kind"] == "duplicate" else 0)
+    expect_same(archive, clean, 0)
+    expect_same(archive, clean, 2)
+    lamp = slots_of("single")[STRUCK["basis"] - CYCLE]["row"]
+    expect_same(archive, clean, 1, [lamp] if lost else [])
+
+
+@pytest.mark.parametrize("kind", STRUCK)
+def test_a_camera_whose_clock_starts_anew_is_found_again_by_the_optical_code(tmp_path, clean, kind):
+    fault = {"kind": "restart_camera", "keep_clock": False, "trigger": STRUCK[kind]}
+    archive, report = record(tmp_path / "take", [fault])
+    assert missing_triggers(archive) == set() and report["camera_restarts"] == 1
+    for index in range(CYCLES):
+        expect_same(archive, clean, index)
+
+
+@pytest.mark.parametrize("kind", STRUCK)
+def test_a_board_that_resets_ends_the_take_with_what_was_proved(tmp_path, clean, kind):
+    archive, report = record(tmp_path / "take", [], "--board-inject", f"reset@trigger:{STRUCK[kind]}", code=2)
+    missing = missing_triggers(archive)
+    # The log is read in messages: what the board had not told when it was reset is missing too, and nothing before.
+    assert missing == set(range(min(missing), CYCLES * CYCLE)) and min(missing) <= STRUCK[kind]
+    assert report["board_end"] and report["targets_written"] >= 1
+    expect_same(archive, clean, 0)
+
+
+def test_a_frozen_picture_in_a_lit_landmark_takes_down_its_stretch_and_nothing_else(tmp_path, clean):
+    archive, _ = record(tmp_path / "take", [{"kind": "freeze", "trigger": STRUCK["tracking"]}], code=2)
+    missing = missing_triggers(archive)
+    # Back to the tracking slot before it. The matte slot in between proves nothing in a scene without a matte board: it
+    # is as dark as a lamp behind the spheres.
+    assert missing == set(range(STRUCK["tracking"] - 17, STRUCK["tracking"] + 1))
+    assert identification(archive)["missing"][0]["why"].startswith("the optical code disagrees")
+    expect_same(archive, clean, 0)
+    rows = [slots_of("single")[trigger - CYCLE]["row"] for trigger in missing]
+    expect_same(archive, clean, 1, [row for row in rows if row >= 0])
+    expect_same(archive, clean, 2)
+
+
+def test_a_lost_slot_of_a_multiplexed_basis_costs_its_target_which_is_named(tmp_path):
+    trigger = CYCLE + next(i for i, slot in enumerate(slots_of("s159")) if slot["kind"] == "basis" and i > 50)
+    archive, report = record(tmp_path / "take", [{"kind": "drop_frame", "trigger": trigger}], basis="s159", code=2)
+    assert report["targets_written"] == 2 and report["targets_missing"] == 1
+    assert not target_file(archive, 1).exists() and target_file(archive, 2).exists()
+    journal = (archive / "journal.jsonl").read_text()
+    assert f"slots are missing: {trigger - CYCLE}" in journal
+    assert manifest(archive)["extra"]["identification"]["slots_missing"] == 1

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Processes of the demo: a virtual stage that stays up while the daemon records from it, and programs that print JSON."""
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BIN = ROOT / "build/host/bin"
+
+
+class Clock:
+    """Where the wall time went, by step; a step that comes again adds up."""
+
+    def __init__(self):
+        self.steps = {}
+        self.start = time.monotonic()
+
+    def __call__(self, name):
+        return _Step(self, name)
+
+    def total(self):
+        return time.monotonic() - self.start
+
+
+class _Step:
+    def __init__(self, clock, name):
+        self.clock, self.name = clock, name
+
+    def __enter__(self):
+        self.began = time.monotonic()
+        print(f"{self.clock.total():6.1f} s  {self.name}", flush=True)
+
+    def __exit__(self, *_):
+        spent = time.monotonic() - self.began
+        self.clock.steps[self.name] = round(self.clock.steps.get(self.name, 0) + spent, 2)
+
+
+def run(*command, log=None):
+    """Runs a program of the project and returns what it printed; on failure, ends the demo with its own words."""
+    done = subprocess.run([str(part) for part in command], cwd=ROOT, capture_output=True, text=True)
+    if log:
+        Path(log).write_text(done.stdout + done.stderr)
+    if done.returncode != 0:
+        sys.exit(f"demo: this failed with exit code {done.returncode}:\n  {' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def run_json(*command, log=None):
+    return json.loads(run(*command, log=log))
+
+
+class VirtualStage:
+    """`stagesim run`: an emulated board and a camera around a simulated scene, until the `with` block ends."""
+
+    def __init__(self, scene, stage, work, *options):
+        self.work = Path(work)
+        self.work.mkdir(parents=True, exist_ok=True)
+        for stale in [*self.work.glob("*.sock"), *self.work.glob("*.ring")]:
+            stale.unlink()
+        self.command = [BIN / "stagesim", "run", scene, "--stage", stage, "--work", self.work, *options]
+        self.log = self.work / "stagesim.log"
+
+    def __enter__(self):
+        with open(self.log, "w") as log:
+            self.process = subprocess.Popen([str(part) for part in self.command], cwd=ROOT, stdout=log, stderr=log)
+        while not (self.work / "board.sock").exists():  # it appears when everything is ready
+            if self.process.poll() is not None:
+                sys.exit(f"demo: the virtual stage ended early; it said:\n{self.log.read_text()}")
+            time.sleep(0.05)
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait()
+
+    def devices(self):
+        return ["--board", f"socket:{self.work}/board.sock", "--camera", f"ring:{self.work}/cam0.ring"]
+
+
+def use_root():
+    os.chdir(ROOT)
