@@ -18,6 +18,7 @@ enum {
     BOARD_PIN_TRIG0 = 6,
     BOARD_PINS_END = 12,
     BOARD_PIN_STOP_INPUTS = 12,     // the first of BOARD_STOP_INPUTS, in the order of enum board_stop_input
+    BOARD_PIN_GENLOCK = 15,         // its rise can start play
     BOARD_LIGHT_EN_ACTIVE_LOW = 0,  // 1: the pad is inverted and pulled up, for drivers with an OE input
     BOARD_CHAIN_BITS = 176,         // 11 drivers of 16 outputs: 156 lamps, 6 on the matte board, spares
     BOARD_SHIFT_DIVIDER = 1         // 17.9 MHz; 2 for drivers or wiring that need 8.9 MHz
@@ -53,6 +54,9 @@ void board_connect_pins(uint8_t inverted_triggers);
 
 // Bit n: stop input n is low, or has been since the last call, however shortly.
 uint32_t board_stop_inputs(void);
+
+// Forgets rises of GENLOCK. They only wake: PIO starts by itself, and the processor is to notice soon.
+void board_forget_genlock(void);
 
 uint64_t board_time_us(void);
 

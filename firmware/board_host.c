@@ -29,6 +29,7 @@ static struct {
     const struct sequence* following;  // from cycle following_from on; null when no swap is due
     uint32_t following_from;
     bool playing;
+    bool at_edge, waiting;  // for GENLOCK: armed so; started and not yet playing
     uint64_t start_ticks;
     uint64_t next_rise_ticks;  // of next_slot, on the board's clock
     uint32_t next_slot, cycle;
@@ -80,7 +81,7 @@ static void play(void) {
         const struct ols_slot* const slot = &sequence_slots(sequence)[board.next_slot];
         if (sequence_triggers(sequence, slot) & 1) {
             const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks +
-                                  (uint64_t)(int64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
+                                  (uint64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
             board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
         }
         board.next_rise_ticks += slot->period_ticks;
@@ -172,6 +173,10 @@ uint32_t board_stop_inputs(void) {
     return low;
 }
 
+void board_forget_genlock(void) {
+    // Nothing sleeps here.
+}
+
 uint64_t board_time_us(void) {
     return board.time_us;
 }
@@ -202,7 +207,8 @@ uint32_t board_boot_nonce(void) {
 
 // player.h and witness.h
 
-bool player_arm(const struct sequence* sequence) {
+bool player_arm(const struct sequence* sequence, bool at_edge) {
+    board.at_edge = at_edge;
     board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
     board.events = 0;
     board_connect_pins(0);
@@ -211,11 +217,25 @@ bool player_arm(const struct sequence* sequence) {
     return false;
 }
 
-void player_start(void) {
+static void begin_play(void) {
+    board.waiting = false;
     board.playing = true;
     board.start_ticks = now_ticks();
-    board.next_rise_ticks = now_ticks() + SEQUENCE_LATCH_TICKS;
+    board.next_rise_ticks = now_ticks() + SLOT_LATCH_TICKS;
     board.next_slot = board.cycle = 0;
+}
+
+void player_start(void) {
+    board.waiting = board.at_edge;
+    if (!board.waiting) begin_play();
+}
+
+bool player_waiting(void) {
+    return board.waiting;
+}
+
+void board_host_genlock(void) {
+    if (board.waiting) begin_play();
 }
 
 uint32_t player_events(void) {
@@ -240,12 +260,13 @@ void player_poll(void) {
 
 void player_stop(void) {
     board_dark();
-    board.playing = false;
+    board.playing = board.waiting = false;
     board.following = NULL;
     board.events = 0;
 }
 
-void witness_arm(void) {
+void witness_arm(bool at_edge) {
+    (void)at_edge;  // play() stamps from the start of play on
     board.stamp_count = 0;
 }
 

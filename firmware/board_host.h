@@ -33,6 +33,9 @@ void board_host_starve_shifter(void);
 void board_host_delay_triggers(uint32_t ticks);
 void board_host_corrupt_program(void);
 
+// A rise of GENLOCK.
+void board_host_genlock(void);
+
 // Pulls a stop input low (enum board_stop_input), or lets go of it.
 void board_host_pull_stop_input(unsigned input, bool low);
 

@@ -86,6 +86,8 @@ static void init_pins(void) {
         PAD_GPIO(pin) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
         REGISTER_SET((uint32_t)&GPIO_INTE(pin)) = GPIO_EDGE_LOW(pin);
     }
+    PAD_GPIO(BOARD_PIN_GENLOCK) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
+    REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_GENLOCK)) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);
 }
 
 void board_init(void) {
@@ -111,6 +113,10 @@ uint32_t board_stop_inputs(void) {
         if (fell || !(GPIO_STATUS(pin) & GPIO_FROM_PAD)) low |= 1u << n;
     }
     return low;
+}
+
+void board_forget_genlock(void) {
+    GPIO_INTR(BOARD_PIN_GENLOCK) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);
 }
 
 uint64_t board_time_us(void) {

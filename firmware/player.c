@@ -50,12 +50,12 @@ void player_init(void) {
 
     PIO_SM_CLKDIV(PIO0_BASE, timeline.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO0_BASE, timeline.machine) = PIO_EXEC_WRAP(TIMELINE_WRAP_TARGET, TIMELINE_WRAP);
-    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) = PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8);
+    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) = PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_IN(BOARD_PIN_GENLOCK);
 
     PIO_SM_CLKDIV(PIO0_BASE, shifter.machine) = PIO_CLKDIV(BOARD_SHIFT_DIVIDER);
     PIO_SM_EXECCTRL(PIO0_BASE, shifter.machine) =
         PIO_EXEC_WRAP(SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET, SHIFTER_ORIGIN + SHIFTER_WRAP) |
-        PIO_EXEC_STATUS_TX_BELOW(sequence_pattern_words(BOARD_CHAIN_BITS));
+        PIO_EXEC_STATUS_TX_BELOW(slot_pattern_words(BOARD_CHAIN_BITS));
     PIO_SM_PINCTRL(PIO0_BASE, shifter.machine) = PIO_PINS_OUT(BOARD_PIN_DATA, 1) | PIO_PINS_SIDE(BOARD_PIN_CLK, 1);
 
     for (uint32_t n = 0; n < 2; n++) {
@@ -101,14 +101,14 @@ static uint8_t inverted_triggers(const struct sequence* sequence) {
     return (uint8_t)inverted;
 }
 
-bool player_arm(const struct sequence* sequence) {
+bool player_arm(const struct sequence* sequence, bool at_edge) {
     player_stop();
     playing = sequence;
     playing_from = begun = 0;
     set_cycles(sequence, 0, CYCLE_FEED_RING);
     set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
     set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
-    pio_execute(timeline, PIO_JMP | TIMELINE_NEXT);
+    pio_execute(timeline, PIO_JMP | (at_edge ? TIMELINE_GENLOCK : TIMELINE_NEXT));
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
     for (uint32_t n = 0; n < 2; n++) pio_execute(guards[n], PIO_JMP | GUARD_ORIGIN);
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
@@ -122,6 +122,11 @@ bool player_arm(const struct sequence* sequence) {
 
 void player_start(void) {
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(timeline.machine);
+}
+
+bool player_waiting(void) {
+    const uint32_t address = PIO_SM_ADDR(PIO0_BASE, timeline.machine);
+    return address == TIMELINE_GENLOCK || address == TIMELINE_GENLOCK + 1;
 }
 
 // Cycles that a feed has begun since `begun`. One that is behind the other reads as almost a whole ring ahead.

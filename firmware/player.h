@@ -16,11 +16,15 @@ enum player_event { PLAYER_TIMELINE_STARVED = 1 << 0, PLAYER_DONE = 1 << 1, PLAY
 void player_init(void);
 
 // Fills the FIFOs, connects the pins and sends the first pattern. `sequence` must stay as it is until player_stop.
-// False, with the pins dark, when the chain could not be filled.
-bool player_arm(const struct sequence* sequence);
+// False, with the pins dark, when the chain could not be filled. `at_edge`: play begins not with player_start but with
+// the first rise of GENLOCK after it.
+bool player_arm(const struct sequence* sequence, bool at_edge);
 
 // Starts the timeline: the first event plays within a few ticks.
 void player_start(void);
+
+// True until the edge has come, of a start at an edge.
+bool player_waiting(void);
 
 // Goes on with `following` at the end of a cycle: the first that can be changed in time, which is the cycle after the
 // next one or, as some are in FIFOs already, one or two later. *after_cycles says how many of the playing sequence are

@@ -86,6 +86,7 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 #define GPIO_INTR(pin) REGISTER(0x400140f0 + 4 * ((pin) / 8))
 #define GPIO_INTE(pin) REGISTER(0x40014100 + 4 * ((pin) / 8))  // of processor 0
 #define GPIO_EDGE_LOW(pin) (4u << 4 * ((pin) % 8))
+#define GPIO_EDGE_HIGH(pin) (8u << 4 * ((pin) % 8))
 enum {
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
@@ -127,6 +128,7 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SM_CLKDIV(base, machine) REGISTER((base) + 0x0c8 + 0x18 * (machine))
 #define PIO_SM_EXECCTRL(base, machine) REGISTER((base) + 0x0cc + 0x18 * (machine))
 #define PIO_SM_SHIFTCTRL(base, machine) REGISTER((base) + 0x0d0 + 0x18 * (machine))
+#define PIO_SM_ADDR(base, machine) REGISTER((base) + 0x0d4 + 0x18 * (machine))
 #define PIO_SM_INSTR(base, machine) REGISTER((base) + 0x0d8 + 0x18 * (machine))
 #define PIO_SM_PINCTRL(base, machine) REGISTER((base) + 0x0dc + 0x18 * (machine))
 #define PIO_IRQ0_INTE(base) REGISTER((base) + 0x12c)

@@ -7,6 +7,8 @@
 //   LIGHT_EN ________|~~~~ exposure ~~~~|___________    light to light of the next slot: period_ticks, exactly
 //   TRIGn    _____|~~~~ width ~~~~|_________________    from the light on, or wherever its offset puts it
 //   chain         (this slot's pattern)  | next pattern being sent, from the light on, and waited for in the dark
+//
+// A grey slot is as many of these, back to back, as it has planes, each lit half as long as the one before it.
 #include "sequence.h"
 
 #include <string.h>
@@ -15,9 +17,9 @@
 #include "pulse.h"
 #include "text.h"
 
-enum { CYCLE_END_TICKS = EVENTS_TICKS_MIN, KINDS_ALL = (1 << (OLS_DARK + 1)) - 1 };
+enum { KINDS_ALL = (1 << (OLS_DARK + 1)) - 1 };
 enum { SLOTS_A_STEP = 16 };
-_Static_assert((int)TIMELINE_ENTER_TICKS == (int)CYCLE_END_TICKS, "a program may begin where another would go on");
+_Static_assert((int)TIMELINE_ENTER_TICKS == (int)SLOT_CYCLE_END_TICKS, "a program may begin where another would go on");
 
 const struct ols_slot* sequence_slots(const struct sequence* sequence) {
     return (const struct ols_slot*)sequence->words;
@@ -28,7 +30,7 @@ const uint32_t* sequence_patterns(const struct sequence* sequence) {
 }
 
 uint32_t sequence_patterns_words(const struct sequence* sequence) {
-    return sequence->header.slot_count * (uint32_t)sequence->pattern_words;
+    return (sequence->header.program_bytes - sequence->header.slot_count * sizeof(struct ols_slot)) / 4;
 }
 
 const uint32_t* sequence_enter(const struct sequence* sequence) {
@@ -42,23 +44,8 @@ uint32_t sequence_triggers(const struct sequence* sequence, const struct ols_slo
     return fires;
 }
 
-int32_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n) {
-    return slot->trigger_offset_ticks + sequence->header.triggers[n].offset_ticks;
-}
-
-uint16_t sequence_pattern_words(uint16_t chain_bits) {
-    return (uint16_t)((chain_bits + 31) / 32);
-}
-
-uint32_t sequence_shift_ticks(const struct sequence_board* board) {
-    // One divided tick more, for the phase of the shifter's clock.
-    const uint32_t shifter_ticks = SHIFTER_START_TICKS + SHIFTER_BIT_TICKS * board->chain_bits +
-                                   SHIFTER_WORD_TICKS * sequence_pattern_words(board->chain_bits) + 1;
-    return TIMELINE_SHIFT_DELAY_TICKS + board->shift_divider * shifter_ticks;
-}
-
-uint32_t sequence_slot_gap_ticks(void) {
-    return SEQUENCE_LATCH_TICKS + EVENTS_TICKS_MIN + CYCLE_END_TICKS;
+int64_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n) {
+    return (int64_t)slot->trigger_offset_ticks + sequence->header.triggers[n].offset_ticks;
 }
 
 static bool reject(struct ols_error_reply* error, uint16_t slot, const char* reason, uint32_t figure,
@@ -85,37 +72,37 @@ static bool pattern_is_empty_from(const uint32_t* words, uint16_t word_count, ui
     return true;
 }
 
-static uint32_t lit_ticks_of(const struct ols_slot* slot) {
-    return slot->kind == OLS_DARK ? EVENTS_TICKS_MIN : slot->exposure_ticks;
+static bool check_patterns(const struct sequence_board* board, const struct ols_slot* slot, const uint32_t* patterns,
+                           uint16_t number, struct ols_error_reply* error) {
+    const uint16_t words = slot_pattern_words(board->chain_bits);
+    for (uint32_t plane = 0; plane < slot_planes(slot); plane++)
+        if (!pattern_is_empty_from(patterns + plane * words, words, board->chain_bits))
+            return reject(error, number, "a pattern has bits past the end of the chain of ", board->chain_bits,
+                          " bits");
+    if (slot->kind == OLS_DARK && !pattern_is_empty_from(patterns, words, 0))
+        return reject(error, number, "a dark slot must have an empty pattern of ", board->chain_bits, " zeros");
+    return true;
 }
 
-// Ticks from the light on until nothing is left to do in a slot but to wait: it is lit, or the next pattern is being
-// sent in the dark.
-static uint32_t busy_ticks(const struct sequence_board* board, const struct ols_slot* slot) {
-    const uint32_t lit_ticks = lit_ticks_of(slot), shift_ticks = sequence_shift_ticks(board);
-    if (lit_ticks >= shift_ticks) return lit_ticks;
-    return lit_ticks + EVENTS_TICKS_MIN > shift_ticks ? lit_ticks + EVENTS_TICKS_MIN : shift_ticks;
-}
-
-static bool check_slot(const struct sequence_board* board, const struct ols_slot* slot, const uint32_t* pattern,
-                       uint16_t number, struct ols_error_reply* error) {
-    const uint16_t words = sequence_pattern_words(board->chain_bits);
-    const uint32_t gap_ticks = sequence_slot_gap_ticks();
+static bool check_slot(const struct sequence_board* board, const struct ols_slot* slot, uint16_t number,
+                       struct ols_error_reply* error) {
+    const uint32_t gap_ticks = slot_gap_ticks();
     if (slot->kind > OLS_DARK) return reject(error, number, "unknown kind ", slot->kind, "");
     if (slot->trigger_mask >> OLS_TRIGGERS)
         return reject(error, number, "trigger mask ", slot->trigger_mask, ": 15 at most");
     if (slot->reserved != 0) return reject(error, number, "reserved field is ", slot->reserved, ": send 0");
-    if (slot->exposure_ticks < EVENTS_TICKS_MIN)
-        return reject(error, number, "exposure must be at least ", EVENTS_TICKS_MIN, " ticks");
+    if (slot->planes > OLS_PLANES_MAX || (slot->kind == OLS_DARK && slot->planes > 1))
+        return reject(error, number, "its planes are ", slot->planes, ": 8 at most, and none in a dark slot");
+    const uint32_t units = (1u << slot_planes(slot)) - 1;
+    if (slot->exposure_ticks / units < EVENTS_TICKS_MIN)
+        return reject(error, number, "exposure must be at least ", EVENTS_TICKS_MIN * units, " ticks");
+    if (slot->exposure_ticks % units != 0)
+        return reject(error, number, "the exposure of a grey slot must be a multiple of ", units, " ticks");
     if (slot->period_ticks < gap_ticks || slot->period_ticks - gap_ticks < slot->exposure_ticks)
         return reject(error, number, "period must exceed the exposure by at least ", gap_ticks, " ticks");
-    if (slot->period_ticks - gap_ticks < busy_ticks(board, slot))
-        return reject(error, number, "period must be at least ", busy_ticks(board, slot) + gap_ticks,
+    if (slot->period_ticks - gap_ticks < slot_busy_ticks(board, slot))
+        return reject(error, number, "period must be at least ", slot_busy_ticks(board, slot) + gap_ticks,
                       " ticks, to send the next pattern");
-    if (!pattern_is_empty_from(pattern, words, board->chain_bits))
-        return reject(error, number, "the pattern has bits past the end of the chain of ", board->chain_bits, " bits");
-    if (slot->kind == OLS_DARK && !pattern_is_empty_from(pattern, words, 0))
-        return reject(error, number, "a dark slot must have an empty pattern of ", board->chain_bits, " zeros");
     return true;
 }
 
@@ -139,20 +126,28 @@ static bool check_header(const struct sequence_board* board, const struct ols_lo
         return reject(error, OLS_NO_SLOT, "a program has 1 to ", OLS_SLOTS_MAX, " slots");
     if (header->cycles > OLS_CYCLES_MAX)
         return reject(error, OLS_NO_SLOT, "a program counts ", OLS_CYCLES_MAX, " cycles at most: send 0 for endless");
-    const uint32_t pattern_bytes = 4u * sequence_pattern_words(board->chain_bits);
-    const uint32_t program_bytes = header->slot_count * (sizeof(struct ols_slot) + pattern_bytes);
+    return check_triggers(header, error);
+}
+
+static bool check_length(const struct sequence* sequence, struct ols_error_reply* error) {
+    const struct ols_load_begin* const header = &sequence->header;
+    const uint32_t slots_bytes = header->slot_count * sizeof(struct ols_slot);
+    uint32_t patterns = 0;
+    for (uint32_t n = 0; n < header->slot_count && slots_bytes <= header->program_bytes; n++)
+        patterns += slot_planes(&sequence_slots(sequence)[n]);
+    const uint32_t program_bytes = slots_bytes + patterns * sequence->pattern_words * 4;
     if (header->program_bytes != program_bytes)
-        return reject(error, OLS_NO_SLOT, "a program of so many slots has ", program_bytes, " bytes");
+        return reject(error, OLS_NO_SLOT, "a program of such slots has ", program_bytes, " bytes");
     if (program_bytes / 4 >= SEQUENCE_WORDS_MAX)
         return reject(error, OLS_NO_SLOT, "the program is longer than the board's ", 4 * SEQUENCE_WORDS_MAX,
                       " bytes: send fewer slots");
-    return check_triggers(header, error);
+    return true;
 }
 
 // The lead comes from the end of the last slot, where nothing but waiting is left.
 static bool check_lead(const struct sequence_board* board, const struct ols_load_begin* header,
                        const struct ols_slot* last, struct ols_error_reply* error) {
-    const uint32_t lead_ticks_max = last->period_ticks - sequence_slot_gap_ticks() - busy_ticks(board, last);
+    const uint32_t lead_ticks_max = last->period_ticks - slot_gap_ticks() - slot_busy_ticks(board, last);
     if (header->lead_ticks != 0 && header->lead_ticks < EVENTS_TICKS_MIN)
         return reject(error, OLS_NO_SLOT, "lead_ticks must be 0 or at least ", EVENTS_TICKS_MIN, "");
     if (header->lead_ticks > lead_ticks_max)
@@ -174,7 +169,8 @@ static void place_pulse(struct sequence_compiler* compiler, unsigned n, uint16_t
         compiler->refused = !reject(compiler->error, number, "its pulse overlaps an earlier one of trigger ", n, "");
     } else {
         const uint64_t rise = (uint64_t)rise_ticks;
-        *pulse = (struct events_pulse){rise, rise + (width_ticks ? width_ticks : slot->exposure_ticks), number};
+        *pulse = (struct events_pulse){
+            rise, rise + (width_ticks ? width_ticks : slot_span_ticks(compiler->board, slot)), number};
         place->earliest_ticks = pulse->fall_ticks + EVENTS_TICKS_MIN;
     }
 }
@@ -192,21 +188,24 @@ static void next_pulse(void* context, unsigned n, struct events_pulse* pulse) {
     }
 }
 
-// Stretches of the light. What the last slot's dark ends with is the lead of the next cycle and the cycle's end.
+// Stretches of the light, plane by plane. What the last slot's dark ends with is the lead of the next cycle and the
+// cycle's end.
 static void play_slot(struct sequence_compiler* compiler, const struct ols_slot* slot, uint32_t number) {
     struct events* const events = &compiler->events;
     const struct ols_load_begin* const header = &compiler->sequence->header;
     const uint32_t sync_pin = number == 0 ? PIN_SYNC : 0;
     const uint32_t light_pin = slot->kind == OLS_DARK ? 0 : PIN_LIGHT_EN;
-    const uint32_t lit_ticks = lit_ticks_of(slot);
-    const uint32_t sending_ticks = busy_ticks(compiler->board, slot) - lit_ticks;
-    uint32_t rest_ticks = slot->period_ticks - SEQUENCE_LATCH_TICKS - lit_ticks - sending_ticks;
-    if (number + 1 == header->slot_count) rest_ticks -= header->lead_ticks + CYCLE_END_TICKS;
-
-    events_play(events, sync_pin | PIN_LATCH, TIMELINE_HOLD, SEQUENCE_LATCH_TICKS);
-    events_play(events, sync_pin | light_pin, TIMELINE_SHIFT, lit_ticks);
-    if (sending_ticks > 0) events_play(events, sync_pin, TIMELINE_HOLD, sending_ticks);
-    events_play(events, sync_pin, TIMELINE_SYNC, rest_ticks);
+    const uint32_t planes = slot_planes(slot);
+    uint32_t rest_ticks = slot->period_ticks - SLOT_LATCH_TICKS - slot_busy_ticks(compiler->board, slot);
+    if (number + 1 == header->slot_count) rest_ticks -= header->lead_ticks + SLOT_CYCLE_END_TICKS;
+    for (uint32_t plane = 0; plane < planes; plane++) {
+        const uint32_t lit_ticks = slot_lit_ticks(slot, plane);
+        const uint32_t sending_ticks = slot_sending_ticks(compiler->board, slot, plane);
+        events_play(events, sync_pin | PIN_LATCH, TIMELINE_HOLD, SLOT_LATCH_TICKS);
+        events_play(events, sync_pin | light_pin, TIMELINE_SHIFT, lit_ticks);
+        if (sending_ticks > 0) events_play(events, sync_pin, TIMELINE_HOLD, sending_ticks);
+        events_play(events, sync_pin, TIMELINE_SYNC, plane + 1 < planes ? EVENTS_TICKS_MIN : rest_ticks);
+    }
 }
 
 static bool reject_limit(struct ols_error_reply* error, uint16_t slot, const char* reason, uint32_t figure,
@@ -216,12 +215,13 @@ static bool reject_limit(struct ols_error_reply* error, uint16_t slot, const cha
     return false;
 }
 
-static bool add_light(struct sequence_compiler* compiler, const struct ols_slot* slot, const uint32_t* pattern,
+static bool add_light(struct sequence_compiler* compiler, const struct ols_slot* slot, const uint32_t* patterns,
                       uint16_t number) {
     const uint32_t lamps_max = compiler->board->limits.lamps_lit_max;
-    const uint32_t lamps = light_add(&compiler->use, pattern, compiler->sequence->pattern_words, slot->exposure_ticks);
-    if (lamps > lamps_max)
-        return reject_limit(compiler->error, number, "this board's supply lights ", lamps_max, " lamps at once");
+    const uint32_t words = compiler->sequence->pattern_words;
+    for (uint32_t plane = 0; plane < slot_planes(slot); plane++)
+        if (light_add(&compiler->use, patterns + plane * words, words, slot_lit_ticks(slot, plane)) > lamps_max)
+            return reject_limit(compiler->error, number, "this board's supply lights ", lamps_max, " lamps at once");
     return true;
 }
 
@@ -252,26 +252,21 @@ static bool events_are_fine(struct sequence_compiler* compiler, uint16_t number)
 
 void sequence_begin(struct sequence_compiler* compiler, const struct sequence_board* board, struct sequence* sequence) {
     *compiler = (struct sequence_compiler){.board = board, .sequence = sequence};
-    sequence->pattern_words = sequence_pattern_words(board->chain_bits);
+    sequence->pattern_words = slot_pattern_words(board->chain_bits);
     sequence->cycle_words = 0;
 }
 
-// Everything about the cycle as a whole; then its lead.
+// All slots are known to be good: places the triggers, and plays the lead.
 static bool begin_cycle(struct sequence_compiler* compiler) {
     struct sequence* const sequence = compiler->sequence;
     const struct ols_load_begin* const header = &sequence->header;
-    if (!check_header(compiler->board, header, compiler->error)) return false;
-    // The last slot first: the lead is a part of it.
-    const uint16_t last = (uint16_t)(header->slot_count - 1);
-    const struct ols_slot* const slot = &sequence_slots(sequence)[last];
-    const uint32_t* const pattern = sequence_patterns(sequence) + last * (uint32_t)sequence->pattern_words;
-    if (!check_slot(compiler->board, slot, pattern, last, compiler->error)) return false;
-    if (!check_lead(compiler->board, header, slot, compiler->error)) return false;
+    const struct ols_slot* const last = &sequence_slots(sequence)[header->slot_count - 1];
+    if (!check_lead(compiler->board, header, last, compiler->error)) return false;
 
     uint32_t* const enter = sequence->words + header->program_bytes / 4;
     *enter = TIMELINE_ENTER << 8 | (header->cycles - 1) << 13;
     for (unsigned n = 0; n < OLS_TRIGGERS; n++)
-        compiler->triggers[n].light_ticks = (uint64_t)header->lead_ticks + SEQUENCE_LATCH_TICKS;
+        compiler->triggers[n].light_ticks = (uint64_t)header->lead_ticks + SLOT_LATCH_TICKS;
     const uint32_t words_max = SEQUENCE_WORDS_MAX - header->program_bytes / 4 - 1;
     events_begin(&compiler->events, enter + 1, words_max, next_pulse, compiler);
     if (header->lead_ticks > 0) events_play(&compiler->events, 0, TIMELINE_HOLD, header->lead_ticks);
@@ -286,27 +281,49 @@ static bool end_cycle(struct sequence_compiler* compiler) {
             return reject(compiler->error, events->pulses[n].slot, "its pulse of trigger ", n,
                           " ends after the cycle: end the cycle with a longer slot");
     // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
-    events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, CYCLE_END_TICKS);
+    events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, SLOT_CYCLE_END_TICKS);
     compiler->sequence->cycle_words = events->word_count;
     return events_are_fine(compiler, (uint16_t)(header->slot_count - 1)) && check_duty(compiler);
 }
 
-static bool add_slot(struct sequence_compiler* compiler) {
+static bool check_next_slot(struct sequence_compiler* compiler) {
     const struct sequence* const sequence = compiler->sequence;
-    const uint16_t number = (uint16_t)compiler->next_slot++;
+    const uint16_t number = (uint16_t)compiler->slots_checked++;
     const struct ols_slot* const slot = &sequence_slots(sequence)[number];
-    const uint32_t* const pattern = sequence_patterns(sequence) + number * (uint32_t)sequence->pattern_words;
-    if (!check_slot(compiler->board, slot, pattern, number, compiler->error)) return false;
-    if (!add_light(compiler, slot, pattern, number)) return false;
-    play_slot(compiler, slot, number);
+    const uint32_t* const patterns = sequence_patterns(sequence) + compiler->next_pattern * sequence->pattern_words;
+    if (!check_slot(compiler->board, slot, number, compiler->error)) return false;
+    compiler->next_pattern += slot_planes(slot);
+    return check_patterns(compiler->board, slot, patterns, number, compiler->error) &&
+           add_light(compiler, slot, patterns, number);
+}
+
+static bool play_next_slot(struct sequence_compiler* compiler) {
+    const uint16_t number = (uint16_t)compiler->slots_played++;
+    play_slot(compiler, &sequence_slots(compiler->sequence)[number], number);
     return !compiler->refused && events_are_fine(compiler, number);
+}
+
+// First all slots are checked, for the triggers of one may reach into others; then they are played.
+static enum sequence_progress check_some(struct sequence_compiler* compiler, uint32_t slot_count) {
+    if (compiler->slots_checked == 0 && !(check_header(compiler->board, &compiler->sequence->header, compiler->error) &&
+                                          check_length(compiler->sequence, compiler->error)))
+        return SEQUENCE_REFUSED;
+    for (int n = 0; n < SLOTS_A_STEP && compiler->slots_checked < slot_count; n++)
+        if (!check_next_slot(compiler)) return SEQUENCE_REFUSED;
+    return SEQUENCE_UNFINISHED;
+}
+
+static enum sequence_progress play_some(struct sequence_compiler* compiler, uint32_t slot_count) {
+    if (compiler->slots_played == 0 && !begin_cycle(compiler)) return SEQUENCE_REFUSED;
+    for (int n = 0; n < SLOTS_A_STEP && compiler->slots_played < slot_count; n++)
+        if (!play_next_slot(compiler)) return SEQUENCE_REFUSED;
+    if (compiler->slots_played < slot_count) return SEQUENCE_UNFINISHED;
+    return end_cycle(compiler) ? SEQUENCE_MADE : SEQUENCE_REFUSED;
 }
 
 enum sequence_progress sequence_step(struct sequence_compiler* compiler, struct ols_error_reply* error) {
     compiler->error = error;
-    if (compiler->next_slot == 0 && !begin_cycle(compiler)) return SEQUENCE_REFUSED;
-    for (int n = 0; n < SLOTS_A_STEP && compiler->next_slot < compiler->sequence->header.slot_count; n++)
-        if (!add_slot(compiler)) return SEQUENCE_REFUSED;
-    if (compiler->next_slot < compiler->sequence->header.slot_count) return SEQUENCE_UNFINISHED;
-    return end_cycle(compiler) ? SEQUENCE_MADE : SEQUENCE_REFUSED;
+    const uint32_t slot_count = compiler->sequence->header.slot_count;
+    const bool checking = compiler->slots_checked < slot_count || slot_count == 0;
+    return checking ? check_some(compiler, slot_count) : play_some(compiler, slot_count);
 }

@@ -9,27 +9,19 @@
 #include <stdint.h>
 
 #include "events.h"
-#include "light_limits.h"
+#include "slot_times.h"
 #include "wire.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-// What of the board decides how a program is played.
-struct sequence_board {
-    uint16_t chain_bits;     // 1..OLS_CHAIN_BITS_MAX
-    uint16_t shift_divider;  // of the shifter's clock
-    struct light_limits limits;
-};
-
 enum {
-    SEQUENCE_LATCH_TICKS = 12,   // 96 ns; TLC5926 asks for 20 ns
-    SEQUENCE_WORDS_MAX = 24320,  // 95 KB, twice: 1024 slots with four triggers of their own
+    SEQUENCE_WORDS_MAX = 24064,  // 94 KB, twice: 1024 slots with four triggers of their own, or 300 grey ones
 };
 
-// One program. Player feeds patterns and cycle words round and round; the pattern of slot n is sent while slot n - 1
-// plays.
+// One program. Player feeds patterns and cycle words round and round; the pattern of a slot, or of a plane of a grey
+// one, is sent while the one before it plays.
 struct sequence {
     struct ols_load_begin header;
     uint16_t pattern_words;  // of one pattern
@@ -48,24 +40,15 @@ const uint32_t* sequence_enter(const struct sequence* sequence);    // the cycle
 uint32_t sequence_triggers(const struct sequence* sequence, const struct ols_slot* slot);
 
 // Ticks from a slot's light to the rise of trigger n.
-int32_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n);
-
-// Words of a pattern, padded to whole ones.
-uint16_t sequence_pattern_words(uint16_t chain_bits);
-
-// Ticks from the moment a slot lights to its successor's whole pattern being in the chain: no slot may be shorter than
-// this and the gap.
-uint32_t sequence_shift_ticks(const struct sequence_board* board);
-
-// Ticks of a period that cannot be exposure: latching, and the cost of the events.
-uint32_t sequence_slot_gap_ticks(void);
+int64_t sequence_trigger_offset_ticks(const struct sequence* sequence, const struct ols_slot* slot, unsigned n);
 
 // The making of a sequence from the program in it, some slots at a time: a long one takes several milliseconds.
 struct sequence_compiler {
     const struct sequence_board* board;
     struct sequence* sequence;
     struct ols_error_reply* error;  // of the step that is under way
-    uint32_t next_slot;
+    uint32_t slots_checked, slots_played;
+    uint32_t next_pattern;  // of the next slot to be checked
     struct events events;
     struct light_use use;
     struct sequence_trigger_place {

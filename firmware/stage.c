@@ -31,6 +31,7 @@ static uint32_t checked_crc32;
 static uint64_t start_us;
 static uint32_t stamps_read;
 static uint32_t cycles_of_done;   // of the program that has played to its end
+static bool at_edge;              // GENLOCK starts, not the command alone
 static uint32_t heartbeat_ticks;  // 0: the host may be silent
 static uint64_t heard_us;         // when the host's last request came
 static uint8_t programs_swapped;  // since start
@@ -154,9 +155,15 @@ static enum ols_fault cause_from_outside(uint32_t stops, bool host_is_there) {
     return heartbeat_ticks != 0 && silent_ticks > heartbeat_ticks ? OLS_FAULT_HEARTBEAT : OLS_FAULT_NONE;
 }
 
+static void begin_play(void) {
+    start_us = board_time_us();
+    state = OLS_STATE_PLAYING;
+}
+
 void stage_poll(bool host_is_there) {
     const uint32_t stops = board_stop_inputs();  // in every state: an edge that nobody takes would not let it sleep
-    if (state == OLS_STATE_ARMED || state == OLS_STATE_PLAYING) {
+    board_forget_genlock();
+    if (state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) {
         // First, for the program's own faults may be its consequences.
         const enum ols_fault cause = cause_from_outside(stops, host_is_there);
         if (cause != OLS_FAULT_NONE) {
@@ -165,11 +172,12 @@ void stage_poll(bool host_is_there) {
             return end_in_fault(cause, playing ? ticks_since_start() : 0);
         }
     }
+    if (state == OLS_STATE_WAITING && !player_waiting()) begin_play();
     if (state == OLS_STATE_PLAYING) follow_play();
 }
 
 bool stage_load_begin(const struct ols_load_begin* begin, struct ols_error_reply* error) {
-    if (state == OLS_STATE_ARMED || state == OLS_STATE_FAULT)
+    if (state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_FAULT)
         return refuse_state(error, "a program is armed: stop it, or start it, before loading another");
     if (next == OLS_NEXT_SWAPPING)
         return refuse_state(error, "a swap is under way: load when the status no longer says so");
@@ -254,6 +262,8 @@ void stage_begin_request(void) {
 static bool arm_is_safe(const struct ols_arm* arm, struct ols_error_reply* error) {
     if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
         return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
+    if (arm->start_source > OLS_START_BY_EDGE || arm->reserved[0] || arm->reserved[1] || arm->reserved[2])
+        return refuse(error, OLS_ERROR_BAD_PROGRAM, "start_source is 0 (command) or 1 (edge), reserved fields are 0");
     board_stop_inputs();  // forgets edges of the past
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP)
@@ -277,8 +287,9 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
     trigger_log_begin(current);
     programs_swapped = 0;
     stamps_read = 0;
-    witness_arm();
-    if (!player_arm(current)) {
+    at_edge = arm->start_source == OLS_START_BY_EDGE;
+    witness_arm(at_edge);
+    if (!player_arm(current, at_edge)) {
         end_in_fault(OLS_FAULT_SHIFTER_STARVED, 0);
         refuse_fault(error);
         return STAGE_REFUSED;
@@ -290,10 +301,10 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
 
 bool stage_start(struct ols_error_reply* error) {
     if (state != OLS_STATE_ARMED) return refuse_state(error, "not armed: arm first");
-    start_us = board_time_us();
+    begin_play();
     witness_start();
     player_start();
-    state = OLS_STATE_PLAYING;
+    if (at_edge) state = OLS_STATE_WAITING;
     return true;
 }
 

@@ -3,12 +3,16 @@
 #ifndef OLS_WITNESS_H
 #define OLS_WITNESS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { WITNESS_RING_STAMPS = 1024 };
 
 void witness_init(void);
-void witness_arm(void);
+// `at_edge`: counts from the first rise of GENLOCK after witness_start, not from that.
+void witness_arm(bool at_edge);
+
+// Before player_start: an edge between the two is then one that both know of.
 void witness_start(void);
 
 // Rising edges of TRIG0 seen since start.

@@ -22,6 +22,7 @@ OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-e
 #define OLS_PAYLOAD_BYTES_MAX 1024  // of one frame
 #define OLS_SLOTS_MAX 1024          // of one program
 #define OLS_TRIGGERS 4              // TRIG0 to TRIG3
+#define OLS_PLANES_MAX 8            // of a grey slot
 #define OLS_CYCLES_MAX 524288       // of one program, when counted
 #define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
 #define OLS_LOG_ENTRIES_MAX 48      // of one reply
@@ -46,7 +47,7 @@ enum ols_message {
     OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
     OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
     OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
-    OLS_START = 0x06,             // armed -> playing
+    OLS_START = 0x06,             // armed -> playing, or waiting for the edge on GENLOCK that starts
     OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
     OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
     OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
@@ -62,6 +63,8 @@ struct ols_hello {
 
 enum ols_capability {
     OLS_CAN_OFFSET_TRIGGERS = 1,  // triggers may have offsets, widths and polarities of their own
+    OLS_CAN_START_BY_EDGE = 4,    // of GENLOCK
+    OLS_CAN_GREY = 8,             // slots may have planes
     OLS_CAN_SWAP = 2              // the next program can be loaded while one plays
 };
 
@@ -78,19 +81,20 @@ struct ols_hello_reply {
     uint32_t slot_gap_ticks;          // period_ticks - exposure_ticks must be at least this
     uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
     uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
+    uint32_t edge_start_ticks;        // from the rise of GENLOCK to the begin of the first cycle
 } OLS_PACKED;
 
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
 struct ols_trigger {
     int32_t offset_ticks;  // of its rise, added to each slot's own; before the light when negative
-    uint32_t width_ticks;  // 0: the slot's exposure
+    uint32_t width_ticks;  // 0: from the slot's first light to its last
     uint8_t skip_kinds;    // bit k: does not fire in slots of kind k
     uint8_t active_low;    // 1: the pin idles high and is low while the camera is to expose
     uint16_t reserved;     // 0
 } OLS_PACKED_WORDS;
 
 // The program follows in chunks: slot_count times an ols_slot, then the patterns of all slots in the same order,
-// ceil(chain_bits / 32) words each.
+// ceil(chain_bits / 32) words each; those of a grey slot from the most significant plane to the least.
 struct ols_load_begin {
     uint16_t slot_count;  // 1..OLS_SLOTS_MAX
     uint16_t chain_bits;  // must be the board's
@@ -116,16 +120,24 @@ enum ols_slot_kind {
 struct ols_slot {
     uint8_t kind;                  // enum ols_slot_kind
     uint8_t trigger_mask;          // bit n: TRIGn
-    uint16_t reserved;             // 0
-    uint32_t exposure_ticks;       // of the light
+    uint8_t planes;                // bits of a lamp's level, 2 to 8, one pattern each; 0 or 1: on/off, one pattern
+    uint8_t reserved;              // 0
+    uint32_t exposure_ticks;       // of a lamp at its highest level; a multiple of 2^planes - 1
     uint32_t period_ticks;         // from this slot's light to the next slot's
     int32_t trigger_offset_ticks;  // from the light to the triggers, before it when negative
 } OLS_PACKED_WORDS;
 
 #define OLS_HEARTBEAT_TICKS_MIN 625000  // 5 ms: the board looks every millisecond or two
 
+enum ols_start_source {
+    OLS_START_BY_COMMAND = 0,
+    OLS_START_BY_EDGE = 1  // the first rise of GENLOCK after OLS_START
+};
+
 struct ols_arm {
     uint32_t heartbeat_ticks;  // without a message for longer than this, armed or playing, is a fault; 0: never
+    uint8_t start_source;      // enum ols_start_source
+    uint8_t reserved[3];       // 0
 } OLS_PACKED;
 
 enum ols_state {
@@ -133,8 +145,9 @@ enum ols_state {
     OLS_STATE_LOADED = 1,
     OLS_STATE_ARMED = 2,
     OLS_STATE_PLAYING = 3,
-    OLS_STATE_DONE = 4,  // all cycles played; the program is still there
-    OLS_STATE_FAULT = 5  // dark until OLS_CLEAR_FAULT
+    OLS_STATE_DONE = 4,    // all cycles played; the program is still there
+    OLS_STATE_FAULT = 5,   // dark until OLS_CLEAR_FAULT
+    OLS_STATE_WAITING = 6  // for the edge that starts
 };
 
 // The program that is to follow the playing one.
@@ -226,12 +239,12 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 68, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 72, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
-OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 4, "arm");
+OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 8, "arm");
 OLS_WIRE_ASSERT(sizeof(struct ols_swap_reply) == 8, "swap reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 44, "status reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");

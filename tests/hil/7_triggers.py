@@ -48,7 +48,7 @@ def test_four_triggers_with_offsets_widths_kinds_and_polarity_are_right_by_two_c
     assert report["right"], report
     assert report["own"]["triggers"] == 2 * (36 + 36 + 2 + 30)
     # The board's own witness, too, sees TRIG0 where it should be, to its resolution of two ticks.
-    wanted = [rise for rise, _ in check_trace.expected_pulses(program, check_trace.expected_slots(program), 0)]
+    wanted = [rise for _, rise, _ in check_trace.expected_pulses(check_trace.expected_slots([program]), 0)]
     assert lost == 0 and len(entries) == len(wanted)
     assert all(abs((entry[0] - entries[0][0]) - (rise - wanted[0])) <= 2 for entry, rise in zip(entries, wanted))
 

@@ -74,7 +74,7 @@ def test_the_shortest_cycles_are_swapped_without_a_gap_again_and_again(emulated)
     played.append((programs[-1], 300))
     board.stop()
     whole = joined(played)
-    report = check_trace.own_check(check_trace.read_vcd(board.trace), whole, check_trace.expected_slots(whole))
+    report = check_trace.own_check(check_trace.read_vcd(board.trace), check_trace.expected_slots([whole]))
     wrong = {name: report[name] for name in report if name.endswith(("_wrong", "_error_ticks")) and report[name]}
     assert not wrong and report["triggers"] == len(whole["slots"]) > 600
 

@@ -4,18 +4,18 @@
 
 usage: check_trace.py TRACE.vcd PROGRAM.json [PROGRAM.json ...]
 
-The programs were played one after the other, and the board stood still between them. PROGRAM.json holds {"cycles": n, "slots": [{"kind", "trigger_mask", "exposure_ticks", "period_ticks", "bits"}, ...]}:
-kind 3 is dark, bits are a list of 0 and 1 in chain order; a slot may have "trigger_offset_ticks", the program up to four
-"triggers" [{"offset_ticks", "width_ticks", "skip_kinds", "active_low"}, ...]. Prints JSON, errors in ticks of 8 ns.
-Exits with 1 if anything is wrong, or if sigrok-cli is not there to check.
+The programs were played one after the other. PROGRAM.json holds
+{"cycles": n, "slots": [{"kind", "trigger_mask", "exposure_ticks", "period_ticks", "bits"}, ...]}: kind 3 is dark, bits are
+a list of 0 and 1 in chain order; a grey slot has "planes" and "levels" instead, and its "span_ticks"; a slot may have
+"trigger_offset_ticks", the program up to four "triggers" [{"offset_ticks", "width_ticks", "skip_kinds", "active_low"},
+...]. Prints JSON, errors in ticks of 8 ns. Exits with 1 if anything is wrong, or if sigrok-cli is not there to check.
 """
 import json
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
-from pathlib import Path
+from collections import deque
 
 TICK_NS = 8
 LATCH_TICKS = 12  # from LATCH to the light
@@ -49,62 +49,101 @@ def pulses(changes, name, active_low=0):
     return list(zip(edges[0::2], edges[1::2]))
 
 
-def latched_words(changes):
-    """(tick, bits shifted in since the last LATCH) for each rise of LATCH."""
-    level, shifted, words = {}, [], []
+def latched_words(changes, chain_bits):
+    """(tick, the chain's bits, which are the last that were shifted in) for each rise of LATCH."""
+    level, shifted, words = {}, deque(maxlen=chain_bits), []
     for tick, name, value in changes:
         rises = value > level.get(name, 0)
         if name == "CLK" and rises:
             shifted.append(level["DATA"])
         if name == "LATCH" and rises:
-            words.append((tick, shifted))
-            shifted = []
+            words.append((tick, list(shifted)))
         level[name] = value
     return words
 
 
-def expected_slots(program):
-    """Every slot that is played, in order, each with its start in ticks after the first."""
-    start, slots = 0, []
-    for _ in range(program["cycles"]):
-        for slot in program["slots"]:
-            slots.append({**slot, "start": start})
-            start += slot["period_ticks"]
+def patterns(slot):
+    """A slot's words on the chain: its bits, or its levels' bits from the most significant plane on."""
+    if "levels" not in slot:
+        return [slot["bits"]]
+    return [[level >> plane & 1 for level in slot["levels"]] for plane in reversed(range(slot["planes"]))]
+
+
+def chain_bits_of(slots):
+    return len(patterns(slots[0])[0])
+
+
+def expected_slots(programs):
+    """Every slot that is played, in order, each with its program's number and triggers, and its start in ticks after that
+    program's first."""
+    slots = []
+    for play, program in enumerate(programs):
+        start = 0
+        for _ in range(program["cycles"]):
+            for slot in program["slots"]:
+                slots.append({**slot, "play": play, "triggers": program.get("triggers", []), "start": start})
+                start += slot["period_ticks"]
     return slots
 
 
-def expected_pulses(program, slots, n):
-    """(rise, fall) of trigger n in ticks after the first slot's light, for every slot in which it fires."""
-    trigger = trigger_of(program, n)
+def trigger_of(slot, n):
+    return (slot["triggers"] + [{}] * 4)[n]
+
+
+def expected_pulses(slots, n):
+    """(play, rise, fall) of trigger n, in ticks after its play's first light, for every slot in which it fires."""
     for slot in slots:
+        trigger = trigger_of(slot, n)
         if slot["trigger_mask"] >> n & 1 and not trigger.get("skip_kinds", 0) >> slot["kind"] & 1:
             rise = slot["start"] + slot.get("trigger_offset_ticks", 0) + trigger.get("offset_ticks", 0)
-            yield rise, rise + (trigger.get("width_ticks", 0) or slot["exposure_ticks"])
+            width = trigger.get("width_ticks", 0) or slot.get("span_ticks", slot["exposure_ticks"])
+            yield slot["play"], rise, rise + width
 
 
-def trigger_of(program, n):
-    return (program.get("triggers", []) + [{}] * 4)[n]
+def expected_periods(wanted):
+    """Ticks from each pulse's rise to the next one's, None where the next is of another play."""
+    return [b[1] - a[1] if a[0] == b[0] else None for a, b in zip(wanted, wanted[1:])]
 
 
-def own_check(changes, program, slots):
+def expected_flashes(slot):
+    """(play, begin, ticks) of each stretch of light of a slot; the begin of later planes is the board's choice, None."""
+    planes = slot.get("planes", 0) or 1
+    unit = slot["exposure_ticks"] // (2**planes - 1)
+    for plane in range(planes):
+        yield slot["play"], None if plane else slot["start"], unit << (planes - 1 - plane)
+
+
+def play_origins(words, slots):
+    """The tick of each play's first light, by the LATCH of its first slot."""
+    origins, n = {}, 0
+    for slot in slots:
+        if n < len(words):
+            origins.setdefault(slot["play"], words[n][0] + LATCH_TICKS)
+        n += len(patterns(slot))
+    return origins
+
+
+def own_check(changes, slots):
     """Triggers, light and shift words as the edges have them, against the slots."""
-    words = latched_words(changes)
+    words = latched_words(changes, chain_bits_of(slots))
+    origins = play_origins(words, slots)
     light = pulses(changes, "LIGHT_EN")
-    lit = [(slot["start"], slot["start"] + slot["exposure_ticks"]) for slot in slots if slot["kind"] != DARK]
-    origin = light[0][0] - lit[0][0] if light and lit else words[0][0] + LATCH_TICKS
+    lit = [flash for slot in slots if slot["kind"] != DARK for flash in expected_flashes(slot)]
+    wrong = sum(fall - rise != ticks or begin not in (None, rise - origins.get(play, 0))
+                for (rise, fall), (play, begin, ticks) in zip(light, lit))
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong([w for _, w in words], slots),
-              "light_pulses": len(light),
-              "light_pulses_wrong": sum((a - origin, b - origin) != pulse for (a, b), pulse in zip(light, lit)) +
-              abs(len(light) - len(lit)), "triggers": 0, "triggers_expected": 0}
+              "light_pulses": len(light), "light_pulses_wrong": wrong + abs(len(light) - len(lit)),
+              "triggers": 0, "triggers_expected": 0}
     periods, offsets, widths = [0], [0], [0]
     for n, name in enumerate(TRIGGERS):
-        found = pulses(changes, name, trigger_of(program, n).get("active_low", 0))
-        wanted = list(expected_pulses(program, slots, n))
+        found = pulses(changes, name, trigger_of(slots[0], n).get("active_low", 0))
+        wanted = list(expected_pulses(slots, n))
         report["triggers"] += len(found)
         report["triggers_expected"] += len(wanted)
-        periods += [(b[0] - a[0]) - (t[0] - s[0]) for a, b, s, t in zip(found, found[1:], wanted, wanted[1:])]
-        offsets += [a[0] - origin - s[0] for a, s in zip(found, wanted)]
-        widths += [(a[1] - a[0]) - (s[1] - s[0]) for a, s in zip(found, wanted)]
+        steps = zip(found, found[1:], expected_periods(wanted))
+        periods += [(b[0] - a[0]) - period for a, b, period in steps if period is not None]
+        offsets += [a[0] - origins.get(play, 0) - rise for a, (play, rise, _) in zip(found, wanted)]
+        widths += [(a[1] - a[0]) - (fall - rise) for a, (_, rise, fall) in zip(found, wanted)]
     report["trigger_period_error_ticks"] = max(map(abs, periods))
     report["trigger_offset_error_ticks"] = max(map(abs, offsets))
     report["exposure_error_ticks"] = max(map(abs, widths))
@@ -112,26 +151,28 @@ def own_check(changes, program, slots):
 
 
 def count_wrong(words, slots):
-    """Words that are not their slot's bits, missing and surplus words among them."""
-    return sum(word != slot["bits"] for word, slot in zip(words, slots)) + abs(len(words) - len(slots))
+    """Words that are not their slot's patterns, missing and surplus words among them."""
+    wanted = [pattern for slot in slots for pattern in patterns(slot)]
+    return sum(word != pattern for word, pattern in zip(words, wanted)) + abs(len(words) - len(wanted))
 
 
-def sigrok_check(path, program, slots):
+def sigrok_check(path, slots):
     """The same from sigrok's SPI and timing decoders, which know nothing of us; the chain must be whole bytes long."""
-    if len(slots[0]["bits"]) % 8:
+    chain_bits = chain_bits_of(slots)
+    if chain_bits % 8:
         return {"error": "the chain is not whole bytes long, which sigrok's SPI decoder needs"}
     if shutil.which("sigrok-cli") is None:
         return {"error": "sigrok-cli is not installed"}
     spi = "spi:clk=CLK:mosi=DATA:cs=LATCH:cs_polarity=active-low:wordsize=8"
     transfers = [line.split(":")[1].split() for line in decode(path, spi, "spi=mosi-transfer")]
-    words = [[int(bit) for byte in line for bit in f"{int(byte, 16):08b}"] for line in transfers]
+    words = [[int(bit) for byte in line for bit in f"{int(byte, 16):08b}"][-chain_bits:] for line in transfers]
     report = {"shift_words_checked": len(words), "shift_words_wrong": count_wrong(words, slots)}
-    wanted = [rise for rise, _ in expected_pulses(program, slots, 0)]
-    periods = [b - a for a, b in zip(wanted, wanted[1:])]
-    edge = "falling" if trigger_of(program, 0).get("active_low", 0) else "rising"
+    periods = expected_periods(list(expected_pulses(slots, 0)))
+    edge = "falling" if trigger_of(slots[0], 0).get("active_low", 0) else "rising"
     found = [ticks_of(line) for line in decode(path, f"timing:data=TRIG0:edge={edge}", "timing=time")]
     report["triggers"] = len(found) + 1
-    off = [abs(ticks - period) if abs(ticks - period) > unit / 2 else 0 for (ticks, unit), period in zip(found, periods)]
+    off = [abs(ticks - period) if abs(ticks - period) > unit / 2 else 0
+           for (ticks, unit), period in zip(found, periods) if period is not None]
     report["trigger_period_error_ticks"] = round(max(off, default=0), 3)
     return report
 
@@ -149,14 +190,14 @@ def ticks_of(line):
     return float(number) * scale_ns / TICK_NS, scale_ns / TICK_NS / 10**digits
 
 
-def check(trace, program):
-    slots = expected_slots(program)
+def check(trace, *programs):
+    slots = expected_slots(programs)
     changes = read_vcd(trace)
-    report = {"own": own_check(changes, program, slots), "sigrok": sigrok_check(trace, program, slots)}
+    report = {"own": own_check(changes, slots), "sigrok": sigrok_check(trace, slots)}
     own, sigrok = report["own"], report["sigrok"]
     report["trigger_period_error_ticks"] = max(own["trigger_period_error_ticks"],
                                                sigrok.get("trigger_period_error_ticks", float("inf")))
-    first = len(list(expected_pulses(program, slots, 0)))
+    first = len(list(expected_pulses(slots, 0)))
     report["right"] = (
         report["trigger_period_error_ticks"] == 0 == own["exposure_error_ticks"] == own["trigger_offset_error_ticks"]
         and own["triggers"] == own["triggers_expected"] and sigrok.get("triggers") == first
@@ -164,40 +205,16 @@ def check(trace, program):
     return report
 
 
-def split(path, programs, folder):
-    """A trace for each program: cut in the longest pause between one program's last LATCH and the next one's first."""
-    header, body = Path(path).read_text().split("$enddefinitions $end\n")
-    latch = re.search(r"\$var \S+ 1 (\S+) LATCH", header)[1]
-    steps = re.split(r"^(?=#)", body, flags=re.M)
-    level, starts, times = {}, [], []
-    for step in steps:
-        time, *changes = step.split("\n")
-        times.append(int(time[1:]) if time.startswith("#") else 0)
-        starts.append(dict(level))
-        level.update((change[1:], change[0]) for change in changes if change[:1] in "01" and change)
-    rises = [i for i, step in enumerate(steps) if f"\n1{latch}\n" in step and starts[i].get(latch) == "0"]
-    cuts, played = [0], 0
-    for program in programs[:-1]:
-        played += program["cycles"] * len(program["slots"])
-        between = range(rises[played - 1] + 1, rises[played] + 1)
-        cuts.append(max(between, key=lambda i: times[i] - times[i - 1]))
-    traces = []
-    for n, (first, last) in enumerate(zip(cuts, cuts[1:] + [len(steps)])):
-        initial = "".join(f"{value}{name}\n" for name, value in starts[first].items())
-        start = f"#{times[first] - TICK_NS}\n{initial}" if n else ""
-        traces.append(Path(folder) / f"{n}.vcd")
-        traces[-1].write_text(header + "$enddefinitions $end\n" + start + "".join(steps[first:last]))
-    return traces
-
-
 def main():
     if len(sys.argv) < 3:
         raise SystemExit(__doc__)
-    programs = [json.loads(Path(path).read_text()) for path in sys.argv[2:]]
-    with tempfile.TemporaryDirectory() as folder:
-        reports = [check(str(trace), program) for trace, program in zip(split(sys.argv[1], programs, folder), programs)]
-    print(json.dumps(reports, indent=2))
-    sys.exit(0 if all(report["right"] for report in reports) else 1)
+    programs = []
+    for path in sys.argv[2:]:
+        with open(path) as file:
+            programs.append(json.load(file))
+    report = check(sys.argv[1], *programs)
+    print(json.dumps(report, indent=2))
+    sys.exit(0 if report["right"] else 1)
 
 
 if __name__ == "__main__":

@@ -21,7 +21,9 @@ namespace ols::test {
 
 struct Slot {
     ols_slot header{};
-    std::vector<uint32_t> pattern;
+    std::vector<uint32_t> pattern;  // of all planes, one after the other
+
+    size_t planes() const { return std::max<size_t>(1, header.planes); }
 };
 
 struct Program {
@@ -87,19 +89,46 @@ inline Slot slot(ols_slot_kind kind, uint32_t exposure_ticks, uint32_t period_ti
     return made;
 }
 
-inline Program random_program(std::mt19937& random, uint16_t chain_bits, int slot_count) {
+// One plane, or a slot's only pattern: what happens when, in ticks since the slot's first light.
+struct Flash {
+    int64_t latch, on, off, sent;
+};
+
+// By the rules of PROTOCOL.md, "Grey levels".
+inline std::vector<Flash> flashes(const Program& program, const Slot& slot) {
+    const int64_t shift = slot_shift_ticks(&program.board), planes = int64_t(slot.planes());
+    std::vector<Flash> all;
+    int64_t on = 0;
+    for (int64_t plane = 0; plane < planes; plane++) {
+        const int64_t unit = slot.header.exposure_ticks / ((1 << planes) - 1);
+        const int64_t lit = slot.header.kind == OLS_DARK ? 8 : unit * (1 << (planes - 1 - plane));
+        const int64_t sent = on + (lit >= shift ? lit : std::max(lit + 8, shift));
+        all.push_back({on - SLOT_LATCH_TICKS, on, on + lit, sent});
+        on = sent + 8 + SLOT_LATCH_TICKS;
+    }
+    return all;
+}
+
+// Up to `planes_max` planes in some of the slots.
+inline Program random_program(std::mt19937& random, uint16_t chain_bits, int slot_count, int planes_max = 8) {
     Program program;
     program.board.chain_bits = chain_bits;
     const int words = (chain_bits + 31) / 32;
-    const uint32_t shift_ticks = sequence_shift_ticks(&program.board), gap_ticks = sequence_slot_gap_ticks();
+    const uint32_t shift_ticks = slot_shift_ticks(&program.board), gap_ticks = slot_gap_ticks();
     for (int n = 0; n < slot_count; n++) {
-        const uint32_t exposure_ticks = 16 + random() % 4000;
         const uint32_t spare_ticks = random() % 3 ? random() % 2000 : 0;
-        const uint32_t period_ticks = std::max(exposure_ticks, shift_ticks) + gap_ticks + spare_ticks;
-        Slot made = slot(ols_slot_kind(random() % 4), exposure_ticks, period_ticks, words, uint8_t(random() % 16));
-        if (made.header.kind != OLS_DARK)
+        Slot made = slot(ols_slot_kind(random() % 4), 16 + random() % 4000, 0, words, uint8_t(random() % 16));
+        const bool dark = made.header.kind == OLS_DARK;
+        if (random() % 3 == 0 && !dark) made.header.planes = uint8_t(random() % uint32_t(planes_max + 1));
+        const uint32_t units = (1u << made.planes()) - 1;
+        if (units > 1) made.header.exposure_ticks = units * (8 + random() % 200);
+        made.pattern.assign(size_t(words) * made.planes(), 0);
+        for (size_t plane = 0; plane < made.planes() && !dark; plane++)
             for (int bit = 0; bit < chain_bits; bit++)
-                made.pattern[bit / 32] |= uint32_t(random() & 1) << (31 - bit % 32);
+                made.pattern[plane * size_t(words) + size_t(bit / 32)] |= uint32_t(random() & 1) << (31 - bit % 32);
+        const uint32_t busy_ticks = uint32_t(flashes(program, made).back().sent);
+        made.header.period_ticks =
+            std::max({busy_ticks, shift_ticks, made.header.exposure_ticks}) + gap_ticks + spare_ticks;
         program.slots.push_back(made);
     }
     return program;
@@ -118,7 +147,9 @@ inline std::vector<Pulse> trigger_pulses(const Program& program, int n) {
     for (const Slot& slot : program.slots) {
         if (slot.header.trigger_mask >> n & 1 && !(trigger.skip_kinds >> slot.header.kind & 1)) {
             const int64_t rise = light + slot.header.trigger_offset_ticks + trigger.offset_ticks;
-            pulses.push_back({rise, rise + (trigger.width_ticks ? trigger.width_ticks : slot.header.exposure_ticks)});
+            const bool dark = slot.header.kind == OLS_DARK;
+            const int64_t span = dark ? slot.header.exposure_ticks : flashes(program, slot).back().off;
+            pulses.push_back({rise, rise + (trigger.width_ticks ? trigger.width_ticks : span)});
         }
         light += slot.header.period_ticks;
     }
@@ -212,22 +243,30 @@ struct Stage {
 };
 
 inline void expect_plays_program(const Stage& stage, const Program& program) {
-    ASSERT_EQ(stage.played.size(), program.slots.size() * program.cycles);
-    const int64_t first_light = stage.played[0].latch + SEQUENCE_LATCH_TICKS;
+    ASSERT_FALSE(stage.played.empty());
+    const int64_t first_light = stage.played[0].latch + SLOT_LATCH_TICKS;
+    const size_t words = (program.board.chain_bits + 31u) / 32;
     int64_t light = first_light;
-    for (size_t n = 0; n < stage.played.size(); n++) {
-        SCOPED_TRACE("slot " + std::to_string(n));
-        const Stage::Played& played = stage.played[n];
+    size_t at = 0;  // in what was played
+    for (size_t n = 0; n < program.slots.size() * program.cycles; n++) {
         const Slot& slot = program.slots[n % program.slots.size()];
         const bool lit = slot.header.kind != OLS_DARK;
-        EXPECT_EQ(played.latch, light - SEQUENCE_LATCH_TICKS);
-        EXPECT_EQ(played.light, lit ? (Pulse{light, light + slot.header.exposure_ticks}) : (Pulse{0, 0}));
-        EXPECT_EQ(played.sync, n % program.slots.size() == 0);
-        ASSERT_EQ(played.lamps.size(), program.board.chain_bits);
-        for (int bit = 0; bit < program.board.chain_bits; bit++)
-            ASSERT_EQ(played.lamps[bit], bit_of(slot.pattern, bit)) << "bit " << bit;
+        const std::vector<Flash> planes = flashes(program, slot);
+        for (size_t plane = 0; plane < planes.size(); plane++) {
+            const Flash& flash = planes[plane];
+            SCOPED_TRACE("slot " + std::to_string(n) + ", pattern " + std::to_string(at));
+            ASSERT_LT(at, stage.played.size());
+            const Stage::Played& played = stage.played[at++];
+            EXPECT_EQ(played.latch, light + flash.latch);
+            EXPECT_EQ(played.light, lit ? (Pulse{light + flash.on, light + flash.off}) : (Pulse{0, 0}));
+            EXPECT_EQ(played.sync, n % program.slots.size() == 0);
+            ASSERT_EQ(played.lamps.size(), program.board.chain_bits);
+            for (int bit = 0; bit < program.board.chain_bits; bit++)
+                ASSERT_EQ(played.lamps[bit], bit_of(slot.pattern, int(plane * words) * 32 + bit)) << "bit " << bit;
+        }
         light += slot.header.period_ticks;
     }
+    EXPECT_EQ(at, stage.played.size());
     for (int n = 0; n < OLS_TRIGGERS; n++) {
         std::vector<Pulse> expected;
         for (uint32_t cycle = 0; cycle < program.cycles; cycle++)

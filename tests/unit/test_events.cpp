@@ -27,15 +27,14 @@ void randomise_triggers(std::mt19937& random, Program& program) {
 // Whether the rules of PROTOCOL.md allow the program's triggers: inside the cycle, not over each other, and every two
 // moments at which something begins coincide or are 8 ticks apart.
 bool triggers_can_be_played(const Program& program) {
-    const int64_t begin = -int64_t(program.lead_ticks) - SEQUENCE_LATCH_TICKS;
+    const int64_t begin = -int64_t(program.lead_ticks) - SLOT_LATCH_TICKS;
     const int64_t end = begin + int64_t(cycle_ticks(program)) - 8;
     std::vector<int64_t> moments = {begin, end};
     int64_t light = 0;
     for (const Slot& slot : program.slots) {
-        const int64_t shift = sequence_shift_ticks(&program.board);
-        const int64_t lit = slot.header.kind == OLS_DARK ? 8 : slot.header.exposure_ticks;
-        const int64_t sent = lit >= shift ? lit : std::max(lit + 8, shift);
-        moments.insert(moments.end(), {light - SEQUENCE_LATCH_TICKS, light, light + lit, light + sent});
+        for (const Flash& flash : flashes(program, slot))
+            moments.insert(moments.end(),
+                           {light + flash.latch, light + flash.on, light + flash.off, light + flash.sent});
         light += slot.header.period_ticks;
     }
     for (int n = 0; n < OLS_TRIGGERS; n++) {

@@ -19,27 +19,28 @@ def fixed(text, size):
     return text.encode().ljust(size, b'\0')
 
 
-def slot(kind, triggers, exposure_ticks, period_ticks, offset_ticks):
-    return struct.pack('<BBHIIi', kind, triggers, 0, exposure_ticks, period_ticks, offset_ticks)
+def slot(kind, triggers, planes, exposure_ticks, period_ticks, offset_ticks):
+    return struct.pack('<BBBBIIi', kind, triggers, planes, 0, exposure_ticks, period_ticks, offset_ticks)
 
 
 def trigger(offset_ticks, width_ticks, skip_kinds, active_low):
     return struct.pack('<iIBBH', offset_ticks, width_ticks, skip_kinds, active_low, 0)
 
 
-PROGRAM = (slot(1, 0x3, 6250, 57870, -500) + slot(3, 0x1, 51500, 57870, 0) +
-           struct.pack('<12I', *[0xffffffff] * 4, 0xfffffffc, 0, *[0] * 6))
+# Lamps 0 to 157 at level 128 of 8 planes, and lamp 0 at 1 more; then a dark slot.
+PROGRAM = (slot(1, 0x3, 8, 51000, 57870, -500) + slot(3, 0x1, 0, 51500, 57870, 0) +
+           struct.pack('<54I', *[0xffffffff] * 4, 0xfffffffc, *[0] * 37, 0x80000000, *[0] * 11))
 TRIGGERS = trigger(-2000, 0, 0, 0) + trigger(100, 6250, 0b1101, 1) + 2 * trigger(0, 0, 0, 0)
 # name: (type, payload), all with request id 0x1234.
 MESSAGES = {
     'hello': (0x01, struct.pack('<Q', HASH)),
-    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHH', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
-                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750)),
+    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHHI', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
+                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750, 7)),
     'load_begin': (0x02, struct.pack('<HHIIII', 2, 176, 1000, len(PROGRAM), zlib.crc32(PROGRAM), 2500) + TRIGGERS),
     'load_begin_reply': (0x02 | REPLY, b''),
     'load_chunk': (0x03, struct.pack('<I', 0) + PROGRAM),
     'load_end': (0x04, b''),
-    'arm': (0x05, struct.pack('<I', 12500000)),
+    'arm': (0x05, struct.pack('<IB3x', 12500000, 1)),
     'start': (0x06, b''),
     'stop': (0x07, b''),
     'status': (0x08, b''),

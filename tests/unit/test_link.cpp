@@ -1,123 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The firmware's answers to the host's messages, on the board without hardware: loading, playing, and every way to end
-// dark.
+// The firmware's answers to the host's messages, on the board without hardware: loading, playing and swapping.
 // links: ols_firmware
-#include <gtest/gtest.h>
-
-#include <cstring>
-#include <string>
-#include <vector>
-
-#include "board_host.h"
-#include "frame.h"
 #include "layout_hash.h"
+#include "link_fixture.hpp"
+
+using namespace ols::test;
 
 namespace {
-
-using Bytes = std::vector<uint8_t>;
-
-struct Reply {
-    uint16_t type = 0, id = 0;
-    Bytes payload;
-
-    template <typename T>
-    T as() const {
-        T value{};
-        memcpy(&value, payload.data(), std::min(sizeof value, payload.size()));
-        return value;
-    }
-    bool ok(uint16_t request) const { return type == (request | OLS_REPLY); }
-    uint16_t error() const { return type == (OLS_ERROR | OLS_REPLY) ? as<ols_error_reply>().code : 0; }
-    std::string text() const { return as<ols_error_reply>().text; }
-};
-
-template <typename T>
-Bytes bytes_of(const T& value) {
-    const auto* first = reinterpret_cast<const uint8_t*>(&value);
-    return Bytes(first, first + sizeof value);
-}
-
-class Link : public testing::Test {
-  protected:
-    void SetUp() override {
-        board_host_power_up();
-        board_host_attach();
-    }
-
-    Reply ask(uint16_t type, const Bytes& payload = {}) {
-        uint8_t frame[OLS_FRAME_BYTES_MAX], answer[2 * OLS_FRAME_BYTES_MAX];
-        const size_t bytes = ols_frame_encode(type, ++id_, payload.data(), payload.size(), frame, sizeof frame);
-        const size_t answered = board_host_exchange(frame, bytes, answer, sizeof answer);
-        ols_frame_parser parser{};
-        EXPECT_EQ(ols_frame_parser_write(&parser, answer, answered), answered);
-        ols_frame got{};
-        EXPECT_TRUE(ols_frame_parser_read(&parser, &got));
-        EXPECT_EQ(got.request_id, id_);
-        return {got.type, got.request_id, Bytes(got.payload, got.payload + got.payload_bytes)};
-    }
-
-    Reply arm(uint32_t heartbeat_ticks = 0) { return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks})); }
-
-    ols_status_reply status() { return ask(OLS_STATUS).as<ols_status_reply>(); }
-
-    static Bytes program(int slots, uint32_t period_ticks = 57'870) {
-        Bytes all;
-        for (int n = 0; n < slots; n++) {
-            ols_slot slot{};
-            slot.trigger_mask = 1;
-            slot.exposure_ticks = 50'000;
-            slot.period_ticks = period_ticks;
-            const Bytes header = bytes_of(slot);
-            all.insert(all.end(), header.begin(), header.end());
-        }
-        for (int n = 0; n < slots; n++)
-            for (int word = 0; word < 6; word++)
-                for (int byte = 0; byte < 4; byte++) all.push_back(word < 5 ? uint8_t(37 * n + word) : 0);
-        return all;
-    }
-
-    static ols_load_begin begin_for(const Bytes& program, uint32_t cycles) {
-        ols_load_begin begin{};
-        begin.slot_count = uint16_t(program.size() / 40);
-        begin.chain_bits = 176;
-        begin.cycles = cycles;
-        begin.program_bytes = uint32_t(program.size());
-        begin.program_crc32 = ols_crc32(0, program.data(), program.size());
-        return begin;
-    }
-
-    Reply load(const Bytes& program, uint32_t cycles = 1) {
-        EXPECT_TRUE(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program, cycles))).ok(OLS_LOAD_BEGIN));
-        for (size_t offset = 0; offset < program.size(); offset += 1000) {
-            Bytes chunk = bytes_of(ols_load_chunk{uint32_t(offset)});
-            const size_t end = std::min(program.size(), offset + 1000);
-            chunk.insert(chunk.end(), program.begin() + long(offset), program.begin() + long(end));
-            EXPECT_TRUE(ask(OLS_LOAD_CHUNK, chunk).ok(OLS_LOAD_CHUNK));
-        }
-        return ask(OLS_LOAD_END);
-    }
-
-    void play(uint32_t cycles = 0) {
-        ASSERT_TRUE(load(program(18), cycles).ok(OLS_LOAD_END));
-        ASSERT_TRUE(arm().ok(OLS_ARM));
-        ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
-    }
-
-    void expect_fault(ols_fault cause) {
-        const ols_status_reply now = status();
-        EXPECT_EQ(now.state, OLS_STATE_FAULT);
-        EXPECT_EQ(now.fault, cause);
-        EXPECT_FALSE(board_host_pins_are_connected());
-        EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
-        for (const uint16_t type : {OLS_START, OLS_STOP, OLS_LOAD_END})
-            EXPECT_EQ(ask(type).error(), OLS_ERROR_FAULT_LATCHED) << "until it is cleared";
-        EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_FAULT_LATCHED);
-        EXPECT_TRUE(ask(OLS_CLEAR_FAULT).ok(OLS_CLEAR_FAULT));
-        EXPECT_EQ(status().state, OLS_STATE_IDLE);
-    }
-
-    uint16_t id_ = 0;
-};
 
 TEST_F(Link, hello_tells_layout_and_board) {
     const Reply reply = ask(OLS_HELLO, bytes_of(ols_hello{OLS_LAYOUT_HASH}));
@@ -323,134 +212,25 @@ TEST_F(Link, wrong_lengths_and_unknown_messages_are_refused) {
     EXPECT_EQ(ask(0x4101).error(), OLS_ERROR_UNKNOWN_MESSAGE);
 }
 
-TEST_F(Link, a_starved_timeline_is_a_fault_with_slot_and_tick) {
-    play();
-    board_host_run_us(10'000);
-    board_host_starve_timeline();
-    board_host_run_us(1'000);
-    const ols_status_reply now = status();
-    EXPECT_EQ(now.fault_slot, (10'000 * 125 / 57'870) % 18);
-    EXPECT_NEAR(double(now.fault_ticks), 11'000 * 125, 1000 * 125);
-    expect_fault(OLS_FAULT_TIMELINE_STARVED);
-}
-
-TEST_F(Link, a_starved_shifter_is_a_fault_while_playing_and_arming) {
-    play();
-    board_host_starve_shifter();
-    board_host_run_us(1'000);
-    expect_fault(OLS_FAULT_SHIFTER_STARVED);
-    ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-    EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
-    expect_fault(OLS_FAULT_SHIFTER_STARVED);
-}
-
-TEST_F(Link, a_late_trigger_is_a_fault) {
-    play();
-    board_host_run_us(10'000);
-    board_host_delay_triggers(40);
-    board_host_run_us(2'000);
-    expect_fault(OLS_FAULT_SLIPPED);
-}
-
-TEST_F(Link, a_lost_host_is_a_fault_while_armed_and_while_playing_and_none_while_idle) {
-    board_host_detach();
-    board_host_run_us(2'000);
-    board_host_attach();
-    EXPECT_EQ(status().state, OLS_STATE_IDLE);
-    play();
-    board_host_detach();
-    board_host_run_us(1'000);
-    EXPECT_FALSE(board_host_pins_are_connected());
-    board_host_attach();
-    expect_fault(OLS_FAULT_HOST_LOST);
-    ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-    ASSERT_TRUE(arm().ok(OLS_ARM));
-    board_host_detach();
-    board_host_run_us(1'000);
-    board_host_attach();
-    expect_fault(OLS_FAULT_HOST_LOST);
-}
-
-TEST_F(Link, each_stop_input_is_a_fault_of_its_own_while_armed_and_while_playing_however_short) {
-    const ols_fault causes[] = {OLS_FAULT_EMERGENCY_STOP, OLS_FAULT_OVER_TEMPERATURE, OLS_FAULT_OPEN_LAMP};
-    for (unsigned input = 0; input < 3; input++) {
-        play();
-        board_host_run_us(5'000);
-        board_host_pull_stop_input(input, true);
-        board_host_pull_stop_input(input, false);
-        board_host_run_us(1'000);
-        EXPECT_EQ(status().fault_slot, 6'000 * 125 / 57'870);
-        expect_fault(causes[input]);
-        ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-        ASSERT_TRUE(arm().ok(OLS_ARM));
-        board_host_pull_stop_input(input, true);
-        board_host_run_us(1'000);
-        expect_fault(causes[input]);
-        ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
-        EXPECT_EQ(arm().error(), OLS_ERROR_NOT_SAFE) << "while it is low";
-        EXPECT_EQ(status().state, OLS_STATE_LOADED);
-        board_host_pull_stop_input(input, false);
-        EXPECT_TRUE(arm().ok(OLS_ARM)) << "and what fell while nothing was armed is forgotten";
-        EXPECT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
-    }
-}
-
-TEST_F(Link, a_silent_host_is_a_fault_only_with_a_heartbeat_and_any_message_is_one) {
-    ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
-    EXPECT_EQ(arm(OLS_HEARTBEAT_TICKS_MIN - 1).error(), OLS_ERROR_BAD_PROGRAM);
-    ASSERT_TRUE(arm(20 * 125'000).ok(OLS_ARM));
+TEST_F(Link, a_start_by_edge_waits_for_it_and_counts_from_it) {
+    ASSERT_TRUE(load(program(18), 1).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_ARM, bytes_of(ols_arm{0, 2, {}})).error(), OLS_ERROR_BAD_PROGRAM);
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    board_host_genlock();
+    EXPECT_EQ(status().state, OLS_STATE_ARMED) << "an edge before the start means nothing";
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
-    for (int n = 0; n < 5; n++) {
-        board_host_run_us(19'000);
-        EXPECT_EQ(status().state, OLS_STATE_PLAYING);
-    }
-    board_host_run_us(19'000);
-    EXPECT_TRUE(board_host_pins_are_connected());
-    board_host_run_us(3'000);
-    EXPECT_FALSE(board_host_pins_are_connected());
-    expect_fault(OLS_FAULT_HEARTBEAT);
-    play();
-    board_host_run_us(60'000'000);
-    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
-}
-
-TEST_F(Link, a_program_that_lights_a_lamp_for_too_much_of_the_cycle_is_refused) {
-    Bytes hot = program(18);
-    for (int n = 0; n < 18; n++) hot[size_t(18 * 16 + n * 24)] = 1;  // one lamp in every slot, 86 %
-    const Reply reply = load(hot);
-    EXPECT_EQ(reply.error(), OLS_ERROR_OVER_LIMIT);
-    EXPECT_NE(reply.text().find("chain bit 31"), std::string::npos) << reply.text();
-}
-
-TEST_F(Link, a_hang_is_a_fault_with_slot_after_the_reset) {
-    play();
-    board_host_run_us(5'000);
-    const uint32_t nonce = status().boot_nonce;
-    board_host_bite();
-    board_host_attach();
+    board_host_run_us(50'000);
+    EXPECT_EQ(status().state, OLS_STATE_WAITING);
+    EXPECT_EQ(status().triggers_fired, 0u);
+    EXPECT_EQ(ask(OLS_LOAD_BEGIN, bytes_of(begin_for(program(2), 1))).error(), OLS_ERROR_BAD_STATE);
+    board_host_genlock();
+    board_host_run_us(2'000);
     const ols_status_reply now = status();
-    EXPECT_NE(now.boot_nonce, nonce);
-    EXPECT_EQ(now.fault_slot, 5'000 * 125 / 57'870);
-    expect_fault(OLS_FAULT_WATCHDOG);
-}
-
-TEST_F(Link, a_program_that_changed_in_memory_is_a_fault) {
-    play(1);
+    EXPECT_EQ(now.state, OLS_STATE_PLAYING);
+    EXPECT_LE(now.now_ticks, 2'000u * 125);
     board_host_run_us(20'000);
-    board_host_corrupt_program();
-    EXPECT_EQ(arm().error(), OLS_ERROR_FAULT_LATCHED);
-    expect_fault(OLS_FAULT_BAD_MEMORY);
-}
-
-TEST_F(Link, the_first_fault_stays_latched_when_more_follow) {
-    play();
-    board_host_run_us(5'000);
-    board_host_starve_timeline();
-    board_host_run_us(1'000);
-    board_host_detach();
-    board_host_run_us(5'000);
-    board_host_attach();
-    EXPECT_EQ(status().fault, OLS_FAULT_TIMELINE_STARVED);
+    EXPECT_EQ(status().state, OLS_STATE_DONE);
+    EXPECT_EQ(status().triggers_fired, 18u);
 }
 
 TEST_F(Link, half_a_message_of_a_host_that_went_away_does_not_confuse_the_next) {

@@ -48,7 +48,7 @@ TEST(Sequence, an_endless_program_goes_on_without_a_gap) {
     ASSERT_TRUE(compiled.ok);
     Stage stage(program, *compiled.words);
     stage.arm();
-    stage.run(3200 * 50 + SEQUENCE_LATCH_TICKS);
+    stage.run(3200 * 50 + SLOT_LATCH_TICKS);
     program.cycles = 50;
     stage.played.resize(100);
     expect_plays_program(stage, program);
@@ -59,8 +59,8 @@ TEST(Sequence, an_endless_program_goes_on_without_a_gap) {
 TEST(Sequence, a_program_entered_at_the_end_of_anothers_cycle_plays_without_a_missing_or_late_slot) {
     std::mt19937 random(22);
     for (int repeat = 0; repeat < 20; repeat++) {
-        Program first = random_program(random, 33, 1 + int(random() % 5));
-        Program second = random_program(random, 33, 1 + int(random() % 5));
+        Program first = random_program(random, 33, 1 + int(random() % 5), 1);
+        Program second = random_program(random, 33, 1 + int(random() % 5), 1);
         first.cycles = repeat % 3 ? 0 : 7;
         second.cycles = 1 + random() % 3;
         const uint32_t first_cycles = 1 + random() % 4;
@@ -168,7 +168,7 @@ TEST(Sequence, the_stated_shift_time_is_what_a_shift_takes) {
         while (!(stage.block.pins >> LIGHT_EN & 1)) stage.tick();
         uint32_t taken_ticks = 0;
         for (; !(stage.block.flags >> 5 & 1); taken_ticks++) stage.tick();
-        const uint32_t stated_ticks = sequence_shift_ticks(&program.board);
+        const uint32_t stated_ticks = slot_shift_ticks(&program.board);
         // This interpreter shows each of the two flags a tick earlier than PIO; and one for the divided clock's phase.
         EXPECT_EQ(stated_ticks, taken_ticks + 3) << chain_bits << " bits";
     }
@@ -177,9 +177,9 @@ TEST(Sequence, the_stated_shift_time_is_what_a_shift_takes) {
 TEST(Sequence, the_shortest_period_that_is_accepted_plays) {
     // The shortest period that is accepted plays; its shift ends just before the sync asks for it.
     Program program;
-    const uint32_t shortest_ticks = sequence_shift_ticks(&program.board) + sequence_slot_gap_ticks();
+    const uint32_t shortest_ticks = slot_shift_ticks(&program.board) + slot_gap_ticks();
     program.slots = {slot(OLS_BASIS, 8, shortest_ticks),
-                     slot(OLS_BASIS, shortest_ticks - sequence_slot_gap_ticks(), shortest_ticks)};
+                     slot(OLS_BASIS, shortest_ticks - slot_gap_ticks(), shortest_ticks)};
     const Compiled compiled = compile(program);
     ASSERT_TRUE(compiled.ok) << compiled.error.text;
     Stage stage(program, *compiled.words);
@@ -226,13 +226,13 @@ TEST(Sequence, what_cannot_be_played_is_refused_with_slot_and_reason) {
     EXPECT_EQ(refused([](Program& p) { p.slots.clear(); }, "1 to 1024 slots"), OLS_NO_SLOT);
     EXPECT_EQ(refused([](Program& p) { p.slots.resize(1025, p.slots[0]); }, "1 to 1024 slots"), OLS_NO_SLOT);
     EXPECT_EQ(refused([](Program& p) { p.slots[1].pattern.pop_back(); }, "has 160 bytes"), OLS_NO_SLOT);
-    EXPECT_EQ(refused(
+    EXPECT_LT(refused(
                   [](Program& p) {
                       for (Slot& s : p.slots) s.header.period_ticks = 0xfffffff0;
                       p.slots.resize(1024, p.slots[0]);
                   },
                   "bytes"),
-              53);
+              OLS_SLOTS_MAX);
 }
 
 TEST(Sequence, a_program_for_another_chain_is_refused) {
@@ -268,6 +268,7 @@ TEST(Witness, counts_every_second_tick_in_every_path) {
     std::mt19937 random(6);
     PioBlock block;
     PioMachine witness{block, WITNESS_PROGRAM, WITNESS_WRAP_TARGET, WITNESS_WRAP};
+    witness.pc = WITNESS_WRAP_TARGET;
     for (int repeat = 0; repeat < 500; repeat++) {
         witness.x = random() % 3000;  // passes zero somewhere below, with the pin low or high or changing
         witness.pushed.clear();

@@ -22,7 +22,7 @@ std::unique_ptr<sequence> sequence_of(std::initializer_list<ols_slot> slots) {
 }
 
 ols_slot slot(uint8_t trigger_mask, uint32_t period_ticks, int32_t offset_ticks = 0) {
-    return {OLS_BASIS, trigger_mask, 0, 1000, period_ticks, offset_ticks};
+    return {OLS_BASIS, trigger_mask, 0, 0, 1000, period_ticks, offset_ticks};
 }
 
 // Slot 2 does not fire TRIG0.

@@ -54,8 +54,8 @@ void expect_golden(const char* name, uint16_t type, const Bytes& payload) {
 constexpr uint64_t hash = 0x0123456789abcdef;
 
 struct TwoSlots {
-    ols_slot slots[2] = {{OLS_TRACKING, 3, 0, 6250, 57870, -500}, {OLS_DARK, 1, 0, 51500, 57870, 0}};
-    uint32_t patterns[2][6] = {{~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}, {}};
+    ols_slot slots[2] = {{OLS_TRACKING, 3, 8, 0, 51000, 57870, -500}, {OLS_DARK, 1, 0, 0, 51500, 57870, 0}};
+    uint32_t patterns[8 + 1][6] = {{~0u, ~0u, ~0u, ~0u, 0xfffffffc, 0}, {}, {}, {}, {}, {}, {}, {1u << 31}, {}};
 };
 
 TEST(Wire, messages_without_payload) {
@@ -83,6 +83,7 @@ TEST(Wire, hello_and_its_reply) {
     reply.slot_gap_ticks = 27;
     reply.lamps_lit_max = 171;
     reply.lamp_duty_max_permille = 750;
+    reply.edge_start_ticks = 7;
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 
@@ -103,7 +104,7 @@ TEST(Wire, loading) {
 }
 
 TEST(Wire, arm) {
-    expect_golden("arm", OLS_ARM, join(ols_arm{12500000}));
+    expect_golden("arm", OLS_ARM, join(ols_arm{12500000, OLS_START_BY_EDGE, {}}));
 }
 
 TEST(Wire, swap_reply) {

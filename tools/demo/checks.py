@@ -49,7 +49,7 @@ def lit_rows(account, frames, basis):
 
 
 def trace(out, sequence_files):
-    """Every edge of the board's trace against the programs it played, by our own reading and by sigrok-cli: a report each."""
+    """Every edge of the board's trace against the programs it played, by our own reading and by sigrok-cli."""
     programs = []
     for number, sequence_file in enumerate(sequence_files):
         sequence = compiled(sequence_file)

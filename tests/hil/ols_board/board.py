@@ -115,7 +115,8 @@ class Link:
 
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
-                 "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille")
+                 "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille",
+                 "edge_start_ticks")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 
@@ -131,8 +132,8 @@ class Link:
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)
 
-    def arm(self, heartbeat_ticks=0):
-        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks))
+    def arm(self, heartbeat_ticks=0, start=wire.BY_COMMAND):
+        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks, start))
 
     def play(self, program, heartbeat_ticks=0):
         self.load(program)

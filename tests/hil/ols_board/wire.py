@@ -10,13 +10,14 @@ ERROR = 0x7F
 
 BASIS, TRACKING, MATTE, DARK = range(4)
 NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
-IDLE, LOADED, ARMED, PLAYING, DONE, FAULT = range(6)
+IDLE, LOADED, ARMED, PLAYING, DONE, FAULT, WAITING = range(7)
 FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory",
           "emergency stop", "over-temperature", "open lamp", "heartbeat")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHH")
-ARM_REQUEST = struct.Struct("<I")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI")
+ARM_REQUEST = struct.Struct("<IB3x")
+BY_COMMAND, BY_EDGE = range(2)
 STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
 SWAP_REPLY = struct.Struct("<IB3x")
 LOG_REPLY = struct.Struct("<IIIHH")
@@ -24,7 +25,7 @@ LOG_ENTRY = struct.Struct("<QIIHBB")
 ERROR_REPLY = struct.Struct("<HH116s")
 LOAD_BEGIN_REQUEST = struct.Struct("<HHIIII")
 TRIGGER = struct.Struct("<iIBBH")
-SLOT = struct.Struct("<BBHIIi")
+SLOT = struct.Struct("<BBBBIIi")
 
 
 def frame(message_type, request_id, payload=b""):
@@ -55,6 +56,13 @@ def pattern_words(bits):
     return [int("".join(map(str, padded[n : n + 32])), 2) for n in range(0, len(padded), 32)]
 
 
+def patterns(slot):
+    """The patterns of a slot as lists of 0 and 1: its "bits", or the planes of its "levels", most significant first."""
+    if "levels" not in slot:
+        return [slot["bits"]]
+    return [[level >> plane & 1 for level in slot["levels"]] for plane in reversed(range(slot["planes"]))]
+
+
 def load_begin(program, data):
     """The payload that announces `data`, the slots of a program. "triggers" holds up to four dictionaries."""
     triggers = (program.get("triggers", []) + [{}] * 4)[:4]
@@ -69,9 +77,10 @@ def program_bytes(program):
     """The slots of a program (see program.py) and then their patterns, as they are loaded."""
     out = bytearray()
     for slot in program["slots"]:
-        out += SLOT.pack(slot["kind"], slot["trigger_mask"], 0, slot["exposure_ticks"], slot["period_ticks"],
-                         slot.get("trigger_offset_ticks", 0))
+        out += SLOT.pack(slot["kind"], slot["trigger_mask"], slot.get("planes", 0), 0, slot["exposure_ticks"],
+                         slot["period_ticks"], slot.get("trigger_offset_ticks", 0))
     for slot in program["slots"]:
-        words = pattern_words(slot["bits"])
-        out += struct.pack(f"<{len(words)}I", *words)
+        for bits in patterns(slot):
+            words = pattern_words(bits)
+            out += struct.pack(f"<{len(words)}I", *words)
     return bytes(out)

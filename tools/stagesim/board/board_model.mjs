@@ -97,7 +97,7 @@ export class Board {
 
   /** Drives an input of the board from outside, until it is driven otherwise. */
   drive(gpio, level) {
-    this.#inputs.set(gpio, level);
+    this.#inputs.set(gpio, level); // and again after a reset
     this.#parts.pads.drive(gpio, level);
   }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Faults that tests inject into the emulated board, at a tick or at a trigger.
 import { starveDma } from './dma.mjs';
-import { STOP_INPUTS } from './pins.mjs';
+import { GENLOCK, STOP_INPUTS } from './pins.mjs';
 import { raiseHardFault } from './processor.mjs';
 import { Cause } from './system.mjs';
 
@@ -16,6 +16,8 @@ const FAULTS = {
   estop: (board) => board.drive(STOP_INPUTS.ESTOP, false),
   overtemperature: (board) => board.drive(STOP_INPUTS.OVER_TEMPERATURE, false),
   openlamp: (board) => board.drive(STOP_INPUTS.OPEN_LAMP, false),
+  genlock: (board) => board.drive(GENLOCK, true),
+  genlockfall: (board) => board.drive(GENLOCK, false),
   release: (board) => Object.values(STOP_INPUTS).forEach((gpio) => board.drive(gpio, true)),
 };
 

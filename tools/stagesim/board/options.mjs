@@ -20,8 +20,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --seed N            of the chip's random bits (default 1)
   --board-id HEX      the flash chip's unique number, 16 digits
   --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; estop, overtemperature, openlamp
-                      pull that input low, release lets all go high; WHEN is a tick, or trigger:N for the N-th rise of
-                      any trigger; may be given several times
+                      pull that input low, release lets all go high; genlock and genlockfall are edges of that
+                      input; WHEN is a tick, or trigger:N for the N-th rise of any trigger; may be given several times
   --stats             print ticks, speed and dropped lines as JSON at the end
   --help
 

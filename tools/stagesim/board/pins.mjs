@@ -5,5 +5,7 @@ export const PINS = Object.freeze({
 });
 /** Inputs that stop everything unless they are high: wired to a closed emergency stop and healthy drivers. */
 export const STOP_INPUTS = Object.freeze({ ESTOP: 12, OVER_TEMPERATURE: 13, OPEN_LAMP: 14 });
+/** The input whose rise can start play. */
+export const GENLOCK = 15;
 export const TRIGGERS = Object.freeze([PINS.TRIG0, PINS.TRIG1, PINS.TRIG2, PINS.TRIG3]);
 export const PIN_MASK = Object.values(PINS).reduce((mask, gpio) => mask | (1 << gpio), 0);
