@@ -44,8 +44,8 @@ unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 hil: all ## the numbered board tests and the capture tests, on the emulated board (BOARD=emulated)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
 
-fuzz-smoke: setup ## a few seconds of every fuzzer
-	@tests/fuzz/run.sh 5
+fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fuzzer
+	@tests/fuzz/run.sh smoke
 
 fuzz: setup ## ten minutes of every fuzzer; SECONDS_EACH=n for another budget
 	@tests/fuzz/run.sh $(or $(SECONDS_EACH),600)

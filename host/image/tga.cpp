@@ -16,20 +16,21 @@ namespace {
 using Bytes = std::vector<unsigned char>;
 
 constexpr size_t header_bytes = 18;
+constexpr size_t packet_pixels_max = 128;
 enum ImageType { true_color = 2, grey = 3, run_length = 8 };  // run_length is a bit added to the others
 
 int word_at(const Bytes& bytes, size_t at) {
     return bytes[at] | bytes[at + 1] << 8;
 }
 
-// Expands packets of up to 128 pixels, a repeated one or that many plain ones, into `wanted` bytes; shorter when the
+// Expands packets of up to packet_pixels_max pixels, a repeated one or that many plain ones, into `wanted` bytes; shorter when the
 // file ends before.
 Bytes expand_runs(const Bytes& file, size_t at, size_t pixel_bytes, size_t wanted) {
     Bytes out;
     out.reserve(wanted);
     while (out.size() < wanted && at < file.size()) {
         const unsigned char packet = file[at++];
-        const size_t count = (packet & 127) + 1u, repeats = packet & 128 ? count : 1;
+        const size_t count = packet % packet_pixels_max + 1, repeats = packet & 128 ? count : 1;
         const size_t bytes = (packet & 128 ? 1 : count) * pixel_bytes;
         if (at + bytes > file.size()) break;
         for (size_t k = 0; k < repeats; ++k) out.insert(out.end(), file.begin() + at, file.begin() + at + bytes);
@@ -56,16 +57,19 @@ Result<Image> read_tga(const std::string& path) {
     const size_t map_bytes = file[1] == 1 ? size_t(word_at(file, 5)) * ((file[7] + 7) / 8) : 0;
     const size_t start = header_bytes + file[0] + map_bytes;
     const int width = word_at(file, 12), height = word_at(file, 14);
-    const size_t wanted = size_t(width) * height * pixel_bytes;
+    const size_t pixel_count = size_t(width) * height, wanted = pixel_count * pixel_bytes;
     if (wanted == 0) return reject("it has no pixels");
 
-    Bytes pixels;
-    if (file[2] & run_length)
-        pixels = expand_runs(file, start, pixel_bytes, wanted);
-    else if (start < file.size())
-        pixels.assign(file.begin() + std::ptrdiff_t(start),
-                      file.begin() + std::ptrdiff_t(std::min(file.size(), start + wanted)));
-    if (pixels.size() < wanted) return reject("it ends early; copy it again");
+    // A header may state 65535 x 65535 pixels, so the file has to be long enough for them before any is made room for.
+    const bool runs = file[2] & run_length;
+    const size_t packets_min = (pixel_count + packet_pixels_max - 1) / packet_pixels_max;
+    const size_t stored_min = runs ? packets_min * (1 + pixel_bytes) : wanted;
+    const auto early = [&] { return reject("it ends early; copy it again"); };
+    if (file.size() < start + stored_min) return early();
+    const auto stored = file.begin() + std::ptrdiff_t(start);
+    const Bytes pixels =
+        runs ? expand_runs(file, start, pixel_bytes, wanted) : Bytes(stored, stored + std::ptrdiff_t(wanted));
+    if (pixels.size() < wanted) return early();
 
     // Descriptor bit 4: columns run right to left; bit 5: rows run top to bottom.
     const bool from_right = file[17] & 16, from_top = file[17] & 32;

@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Builds every fuzzer of this folder and runs each for some seconds (default 5). Findings are kept in build/fuzz/found.
+# Builds every fuzzer of this folder and runs it.
+#   run.sh smoke          earlier findings (tests/fuzz/found) and a fixed number of inputs from a fixed seed
+#   run.sh SECONDS        as long, from a new seed, on top of what earlier runs learnt (build/fuzz/corpus)
+# New findings are kept in build/fuzz/found.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
-seconds=${1:-5}
+budget=${1:-smoke}
 build=$root/build/fuzz
 
 test -e "$build/build.ninja" ||
@@ -12,14 +15,27 @@ test -e "$build/build.ninja" ||
 mapfile -t fuzzers < <(cd "$root/tests/fuzz" && ls fuzz_*.cpp | sed 's/\.cpp$//')
 ninja -C "$build" --quiet "${fuzzers[@]}"
 mkdir -p "$build/found"
-for fuzzer in "${fuzzers[@]}"; do
-    mkdir -p "$build/corpus/$fuzzer"
-    log=$build/$fuzzer.log
-    if ! "$build/bin/$fuzzer" -max_total_time="$seconds" -timeout=10 -artifact_prefix="$build/found/$fuzzer-" \
-        "$build/corpus/$fuzzer" >"$log" 2>&1; then
+
+# run FUZZER ARGUMENT...: quiet unless it finds something
+run() {
+    local fuzzer=$1 log=$build/$1.log
+    shift
+    if ! "$build/bin/$fuzzer" -timeout=10 -artifact_prefix="$build/found/$fuzzer-" "$@" >"$log" 2>&1; then
         cat "$log"
         echo "$fuzzer found something: run build/fuzz/bin/$fuzzer on the file it names above" >&2
         exit 1
     fi
-    echo "$fuzzer: $(sed -n 's/^Done \([0-9]*\) runs.*/\1 runs/p' "$log")"
+}
+
+for fuzzer in "${fuzzers[@]}"; do
+    shopt -s nullglob
+    findings=("$root/tests/fuzz/found/$fuzzer-"*)
+    if ((${#findings[@]})); then run "$fuzzer" "${findings[@]}"; fi
+    if [[ $budget == smoke ]]; then
+        run "$fuzzer" -seed=1 -runs=20000
+    else
+        mkdir -p "$build/corpus/$fuzzer"
+        run "$fuzzer" -max_total_time="$budget" "$build/corpus/$fuzzer"
+    fi
+    echo "$fuzzer: $(sed -n 's/^Done \([0-9]*\) runs.*/\1 runs/p' "$build/$fuzzer.log"), ${#findings[@]} earlier findings"
 done

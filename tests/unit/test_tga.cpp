@@ -71,6 +71,8 @@ TEST(Tga, short_mapped_and_odd_files_are_refused_by_name) {
                                                     {tga(2, 2, 2, 24, 0, {1, 2, 3}), "ends early"},
                                                     {tga(10, 20, 20, 24, 0, {255, 1, 2, 3}), "ends early"},
                                                     {tga(10, 2, 1, 24, 0, {}), "ends early"},
+                                                    {tga(10, 65535, 65535, 32, 0, {255, 1, 2, 3, 4}), "ends early"},
+                                                    {tga(2, 65535, 65535, 32, 0, {1, 2, 3, 4}), "ends early"},
                                                     {tga(1, 2, 2, 8, 0, {0, 0, 0, 0}), "colour-mapped"},
                                                     {tga(2, 2, 1, 16, 0, {0, 0, 0, 0}), "16 bits"},
                                                     {tga(2, 0, 5, 24, 0, {}), "no pixels"}}) {
