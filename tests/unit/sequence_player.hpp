@@ -64,7 +64,8 @@ inline Compiled compile(const Program& program) {
     header.program_bytes = uint32_t(bytes.size());
     header.lead_ticks = program.lead_ticks;
     std::copy(std::begin(program.triggers), std::end(program.triggers), header.triggers);
-    if (bytes.size() <= sizeof result.words->words) std::memcpy(result.words->words, bytes.data(), bytes.size());
+    if (!bytes.empty() && bytes.size() <= sizeof result.words->words)
+        std::memcpy(result.words->words, bytes.data(), bytes.size());
     sequence_compiler compiler;
     sequence_begin(&compiler, &program.board, result.words.get());
     sequence_progress progress;
