@@ -7,7 +7,7 @@
 #include "pulse.h"
 
 enum {
-    LOG_ENTRIES = 2048,
+    LOG_ENTRIES = 1024,
     // Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser.
     TOLERANCE_TICKS = 3,
     WATCHED_TRIGGER = 1 << 0  // TRIG0

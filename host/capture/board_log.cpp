@@ -10,7 +10,7 @@ namespace ols {
 namespace {
 
 // Between two looks at a board that has no more than one message of news. At 2160 triggers a second a message of 48
-// fills in 22 ms; the board keeps 2048.
+// fills in 22 ms; the board keeps 1024.
 constexpr std::chrono::milliseconds poll_pause(2);
 
 // Why a board that no longer plays has stopped; "" when it played to the end.

@@ -110,14 +110,14 @@ TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
     auto fire = [&, n = uint64_t(0)](int count) mutable {
         for (; count > 0; count--, n++) ASSERT_TRUE(trigger_log_add(stamp_at(n * 2000), n * 2000));
     };
-    fire(2048);
+    fire(1024);
     ols_trigger_log_reply header;
-    EXPECT_EQ(read_all(0, header).size(), 2048u);
-    fire(2048);
-    EXPECT_EQ(trigger_log_lost(), 0u) << "all of the first 2048 had been read";
+    EXPECT_EQ(read_all(0, header).size(), 1024u);
+    fire(1024);
+    EXPECT_EQ(trigger_log_lost(), 0u) << "all of the first 1024 had been read";
     fire(100);
     EXPECT_EQ(trigger_log_lost(), 100u);
-    const auto entries = read_all(2048, header);
+    const auto entries = read_all(1024, header);
     EXPECT_EQ(header.first_counter, 2148u);
     EXPECT_EQ(header.next_counter, 4196u);
     EXPECT_EQ(entries.front().counter, 2148u);
