@@ -162,4 +162,44 @@ TEST(Frame, encoding_refuses_what_does_not_fit) {
     EXPECT_EQ(ols_frame_encode(1, 1, payload.data(), OLS_PAYLOAD_BYTES_MAX, frame, sizeof frame), sizeof frame);
 }
 
+TEST(Frame, the_longest_payload_arrives_and_one_byte_more_is_never_encoded) {
+    std::mt19937 random(4);
+    const Message longest{7, 9, Bytes(OLS_PAYLOAD_BYTES_MAX, 0x4c)};
+    EXPECT_EQ(parse(encode(longest), random), std::vector<Message>{longest});
+    uint8_t frame[OLS_FRAME_BYTES_MAX + 1];
+    const Bytes payload(OLS_PAYLOAD_BYTES_MAX + 1);
+    EXPECT_EQ(ols_frame_encode(7, 9, payload.data(), payload.size(), frame, sizeof frame), 0u);
+}
+
+// A parser that kept the byte before it would have no room for the last one of the frame.
+TEST(Frame, the_longest_frame_finds_room_behind_any_number_of_stray_bytes) {
+    const Message longest{7, 9, Bytes(OLS_PAYLOAD_BYTES_MAX, 1)};
+    for (size_t stray = 0; stray < 5; stray++) {
+        Bytes stream(stray, 'x');
+        const Bytes frame = encode(longest);
+        stream.insert(stream.end(), frame.begin(), frame.end());
+        const auto parser = std::make_unique<ols_frame_parser>();
+        ols_frame got;
+        for (size_t n = 0; n + 1 < stream.size(); n++) {
+            ASSERT_EQ(ols_frame_parser_write(parser.get(), &stream[n], 1), 1u);
+            ASSERT_FALSE(ols_frame_parser_read(parser.get(), &got));
+        }
+        ASSERT_EQ(ols_frame_parser_write(parser.get(), &stream.back(), 1), 1u);
+        ASSERT_TRUE(ols_frame_parser_read(parser.get(), &got)) << stray;
+        EXPECT_EQ(got.payload_bytes, OLS_PAYLOAD_BYTES_MAX);
+        EXPECT_EQ(parser->dropped_bytes, stray);
+    }
+}
+
+TEST(Frame, a_damaged_header_is_dropped_as_soon_as_it_is_whole) {
+    Bytes header = encode({7, 9, {}});
+    header.resize(10);
+    header[9] ^= 1;
+    const auto parser = std::make_unique<ols_frame_parser>();
+    ols_frame got;
+    ols_frame_parser_write(parser.get(), header.data(), header.size());
+    EXPECT_FALSE(ols_frame_parser_read(parser.get(), &got));
+    EXPECT_EQ(parser->dropped_bytes, 10u);
+}
+
 }  // namespace
