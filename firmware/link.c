@@ -16,6 +16,7 @@
 
 static struct ols_frame_parser parser;
 static uint32_t session;
+static bool leaving;  // for the boot loader: nothing more is answered
 static uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
 
 // A reply being made; without `ok` it is the error. `busy`: the request takes another turn of the main loop.
@@ -123,6 +124,11 @@ static void answer_clear_fault(const struct ols_frame* request, struct reply* re
     reply->ok = stage_clear_fault(&reply->payload.error);
 }
 
+static void answer_reboot_to_bootloader(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    leaving = reply->ok = stage_may_leave(&reply->payload.error);
+}
+
 static const struct command {
     uint16_t type;
     uint16_t payload_bytes_min, payload_bytes_max;
@@ -140,6 +146,7 @@ static const struct command {
      answer_read_trigger_log},
     {OLS_CLEAR_FAULT, 0, 0, answer_clear_fault},
     {OLS_SWAP, 0, 0, answer_swap},
+    {OLS_REBOOT_TO_BOOTLOADER, 0, 0, answer_reboot_to_bootloader},
 };
 
 static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
@@ -174,17 +181,21 @@ static bool handle(const struct ols_frame* request) {
     return true;
 }
 
+bool link_is_leaving(void) {
+    return leaving && (transport_can_send() || !transport_is_attached());
+}
+
 bool link_poll(void) {
     static struct ols_frame request;
     static bool unanswered;
     if (session != transport_session()) {
         session = transport_session();
         memset(&parser, 0, sizeof parser);
-        unanswered = false;
+        unanswered = leaving = false;
     }
     static uint8_t packet[TRANSPORT_PACKET_BYTES];
     static size_t packet_bytes, packet_used;
-    while (transport_can_send()) {
+    while (!leaving && transport_can_send()) {
         if (unanswered || ols_frame_parser_read(&parser, &request)) {
             if (!unanswered) stage_begin_request();
             unanswered = !handle(&request);

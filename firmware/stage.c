@@ -356,6 +356,11 @@ bool stage_clear_fault(struct ols_error_reply* error) {
     return true;
 }
 
+bool stage_may_leave(struct ols_error_reply* error) {
+    const bool busy = state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
+    return !busy || refuse(error, OLS_ERROR_BAD_STATE, "a program is armed or playing: stop it before flashing");
+}
+
 void stage_status(struct ols_status_reply* status) {
     const struct fault fault = fault_latched();
     const bool done = state == OLS_STATE_DONE;
