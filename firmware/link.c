@@ -16,7 +16,6 @@
 
 static struct ols_frame_parser parser;
 static uint32_t session;
-static bool leaving;  // for the boot loader: nothing more is answered
 static uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
 
 // A reply being made; without `ok` it is the error. `busy`: the request takes another turn of the main loop.
@@ -126,7 +125,7 @@ static void answer_clear_fault(const struct ols_frame* request, struct reply* re
 
 static void answer_reboot_to_bootloader(const struct ols_frame* request, struct reply* reply) {
     (void)request;
-    leaving = reply->ok = stage_may_leave(&reply->payload.error);
+    reply->ok = stage_leave(&reply->payload.error);
 }
 
 static const struct command {
@@ -182,7 +181,7 @@ static bool handle(const struct ols_frame* request) {
 }
 
 bool link_is_leaving(void) {
-    return leaving && (transport_can_send() || !transport_is_attached());
+    return stage_is_leaving() && (transport_can_send() || !transport_is_attached());
 }
 
 bool link_poll(void) {
@@ -191,11 +190,11 @@ bool link_poll(void) {
     if (session != transport_session()) {
         session = transport_session();
         memset(&parser, 0, sizeof parser);
-        unanswered = leaving = false;
+        unanswered = false;
     }
     static uint8_t packet[TRANSPORT_PACKET_BYTES];
     static size_t packet_bytes, packet_used;
-    while (!leaving && transport_can_send()) {
+    while (!stage_is_leaving() && transport_can_send()) {
         if (unanswered || ols_frame_parser_read(&parser, &request)) {
             if (!unanswered) stage_begin_request();
             unanswered = !handle(&request);
