@@ -22,7 +22,11 @@ def test_hello_tells_layout_chain_and_clock(emulated):
     hello = emulated().plug().hello(layout_hash(WIRE_H))
     assert hello["layout_hash"] == layout_hash(WIRE_H)
     assert (hello["chain_bits"], hello["slots_max"], hello["tick_hz"]) == (176, 1024, 125_000_000)
-    assert hello["board_id"] == b"OLS-VIRT"
+
+
+def test_the_board_id_is_the_flash_chips_unique_number(emulated):
+    hello = emulated("--board-id", "0123456789abcdef").plug().hello(0)
+    assert hello["board_id"].hex() == "0123456789abcdef"
 
 
 @pytest.mark.parametrize("name", ("pico", "feather_can"))
