@@ -8,6 +8,7 @@ import pytest
 import usb.backend
 import usb.core
 
+import play
 from ols_board import wire
 from ols_board.board import EmulatedBoard
 from ols_board.program import paper_program
@@ -132,6 +133,13 @@ def test_control_transfers_and_time_outs_have_the_emulated_boards_statuses(cable
     assert link.usb.control(bytes((0x80, 6, 0, 1, 0, 0, 18, 0)))[1][8:12] == bytes((9, 0x12, 1, 0))
     assert link.usb.control(bytes((0xC0, 0x77, 0, 0, 0, 0, 4, 0)))[0] == STALL
     assert link.usb.read(timeout_us=20_000)[0] == TIMED_OUT
+
+
+def test_playing_by_hand_measures_one_single_period(cable, capsys):
+    link = UsbBoard("", cable).plug()
+    play.report(link, *play.play(link, paper_program(cycles=2, slots=36), wire.BY_COMMAND))
+    assert capsys.readouterr().out.splitlines() == [
+        "72 triggers measured, 0 lost; fault: none", "71 periods of 57870 ticks = 462.960 us (measured every second tick)"]
 
 
 def test_another_serial_number_is_answered_with_the_one_that_is_there(cable):
