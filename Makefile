@@ -16,7 +16,7 @@ help: ## list the verbs
 setup: ## install what is needed (apt, npm, pip); does nothing the second time
 	@tools/setup/install.sh
 
-firmware: setup ## build/firmware/stage.elf and stage.uf2
+firmware: setup ## build/firmware/BOARD/stage.elf and stage.uf2, of the default board in build/firmware, too
 	@$(MAKE) --no-print-directory -C firmware
 
 host: setup ## build/host/bin/{stagectl,rf,stagesim}
@@ -41,7 +41,7 @@ unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@$(PYTHON) -m pytest -q tests/unit tests/oracle
 	@cd tools/stagesim/board && npm test --silent
 
-hil: all ## the numbered board tests and the capture tests, on the emulated board (BOARD=emulated)
+hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
 
 fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fuzzer
@@ -59,8 +59,8 @@ lint-fast: setup
 format: setup ## clang-format in place
 	@git ls-files '*.cpp' '*.hpp' '*.c' '*.h' | xargs clang-format -i
 
-flash: firmware ## copy stage.uf2 to a board in BOOTSEL mode
-	@tools/setup/flash.sh build/firmware/stage.uf2
+flash: all ## write the image to the board on USB (BOARD=pico or feather_can, the board's firmware)
+	@$(HOST)/bin/stagectl flash build/firmware/$(or $(BOARD),pico)/stage.uf2
 
 install: host ## install the programs (DESTDIR, PREFIX)
 	@cmake --install $(HOST) --prefix $(or $(PREFIX),/usr/local)

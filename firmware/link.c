@@ -54,7 +54,8 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
         .slot_gap_ticks = slot_gap_ticks(),
         .lamps_lit_max = board_sequence.limits.lamps_lit_max,
         .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
-        .edge_start_ticks = TIMELINE_EDGE_START_TICKS};
+        .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
+        .board = BOARD_NAME};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }
@@ -122,6 +123,11 @@ static void answer_clear_fault(const struct ols_frame* request, struct reply* re
     reply->ok = stage_clear_fault(&reply->payload.error);
 }
 
+static void answer_reboot_to_bootloader(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_leave(&reply->payload.error);
+}
+
 static const struct command {
     uint16_t type;
     uint16_t payload_bytes_min, payload_bytes_max;
@@ -139,6 +145,7 @@ static const struct command {
      answer_read_trigger_log},
     {OLS_CLEAR_FAULT, 0, 0, answer_clear_fault},
     {OLS_SWAP, 0, 0, answer_swap},
+    {OLS_REBOOT_TO_BOOTLOADER, 0, 0, answer_reboot_to_bootloader},
 };
 
 static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
@@ -173,6 +180,10 @@ static bool handle(const struct ols_frame* request) {
     return true;
 }
 
+bool link_is_leaving(void) {
+    return stage_is_leaving() && (transport_can_send() || !transport_is_attached());
+}
+
 bool link_poll(void) {
     static struct ols_frame request;
     static bool unanswered;
@@ -183,7 +194,7 @@ bool link_poll(void) {
     }
     static uint8_t packet[TRANSPORT_PACKET_BYTES];
     static size_t packet_bytes, packet_used;
-    while (transport_can_send()) {
+    while (!stage_is_leaving() && transport_can_send()) {
         if (unanswered || ols_frame_parser_read(&parser, &request)) {
             if (!unanswered) stage_begin_request();
             unanswered = !handle(&request);

@@ -9,4 +9,7 @@
 // is not to wait for anything before the next turn: a long request is being worked on.
 bool link_poll(void);
 
+// True once the host has the answer to its OLS_REBOOT_TO_BOOTLOADER, or has gone: the firmware is to end.
+bool link_is_leaving(void);
+
 #endif

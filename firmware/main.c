@@ -21,5 +21,6 @@ int main(void) {
         usb_poll();
         stage_poll(transport_is_attached());
         if (!link_poll()) board_sleep();
+        if (link_is_leaving()) board_enter_bootloader();
     }
 }

@@ -42,18 +42,19 @@ struct ols_frame_header {
 
 // Requests. Without a struct below, a request or reply has no payload.
 enum ols_message {
-    OLS_HELLO = 0x01,             // -> ols_hello_reply, in any state
-    OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed; while playing, the next program is loaded
-    OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
-    OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
-    OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
-    OLS_START = 0x06,             // armed -> playing, or waiting for the edge on GENLOCK that starts
-    OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
-    OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
-    OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
-    OLS_CLEAR_FAULT = 0x0a,       // fault -> idle; the program must be loaded again
-    OLS_SWAP = 0x0b,              // playing with a next program ready -> ols_swap_reply; goes on with that
-    OLS_ERROR = 0x7f              // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
+    OLS_HELLO = 0x01,                 // -> ols_hello_reply, in any state
+    OLS_LOAD_BEGIN = 0x02,            // ols_load_begin; not while armed; while playing, the next program is loaded
+    OLS_LOAD_CHUNK = 0x03,            // ols_load_chunk and data; chunks in order, without gaps
+    OLS_LOAD_END = 0x04,              // checks CRC and program -> state loaded, or next ready
+    OLS_ARM = 0x05,                   // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
+    OLS_START = 0x06,                 // armed -> playing, or waiting for the edge on GENLOCK that starts
+    OLS_STOP = 0x07,                  // armed, playing or done -> loaded, dark at once
+    OLS_STATUS = 0x08,                // -> ols_status_reply, in any state
+    OLS_READ_TRIGGER_LOG = 0x09,      // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
+    OLS_CLEAR_FAULT = 0x0a,           // fault -> idle; the program must be loaded again
+    OLS_SWAP = 0x0b,                  // playing with a next program ready -> ols_swap_reply; goes on with that
+    OLS_REBOOT_TO_BOOTLOADER = 0x0d,  // not while armed or playing; the board leaves after the reply, to be flashed
+    OLS_ERROR = 0x7f                  // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
 };
 
 // The first eight bytes of both structs never change, whatever else does, so that any two versions can compare hashes.
@@ -82,6 +83,7 @@ struct ols_hello_reply {
     uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
     uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
     uint32_t edge_start_ticks;        // from the rise of GENLOCK to the begin of the first cycle
+    char board[16];                   // whose pins this firmware drives, zero-terminated: "pico", "feather_can"
 } OLS_PACKED;
 
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
@@ -239,7 +241,7 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 72, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 88, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");

@@ -133,3 +133,32 @@ def test_a_program_that_cannot_be_played_is_refused_with_its_slot(emulated, dama
     with pytest.raises(BoardError) as refused:
         emulated().plug().load(program)
     assert refused.value.slot == 3 and message in refused.value.text
+
+
+def test_the_image_of_another_board_plays_the_same_on_its_own_pins(emulated):
+    program = paper_program(cycles=1, slots=18)
+    board = emulated(trace=True, image=ROOT / "build/firmware/feather_can/stage.uf2")
+    play_to_the_end(board, program)
+    board.stop()
+    assert check_trace.check(board.trace, program)["right"]
+
+
+def test_an_image_connected_as_another_board_reaches_no_lamp(emulated):
+    board = emulated("--board", "pico", trace=True, image=ROOT / "build/firmware/feather_can/stage.uf2")
+    link = board.plug()
+    with pytest.raises(BoardError, match="emergency stop"):  # its input is on another pin there
+        link.play(paper_program(cycles=1, slots=18))
+    board.stop()
+    assert not any(level for _, name, level in check_trace.read_vcd(board.trace) if name in ("LATCH", "LIGHT_EN"))
+
+
+def test_latch_is_never_high_while_the_clock_rises_so_the_drivers_stay_in_their_normal_mode(emulated):
+    board = emulated(trace=True)
+    play_to_the_end(board, paper_program(cycles=2, slots=18))
+    board.stop()
+    high, rises, together = set(), 0, 0
+    for _, name, level in check_trace.read_vcd(board.trace):
+        (high.add if level else high.discard)(name)
+        rises += name == "CLK" and level
+        together += name == "CLK" and level and "LATCH" in high
+    assert rises >= 36 * 176 and together == 0

@@ -65,6 +65,7 @@ TEST(Wire, messages_without_payload) {
     expect_golden("stop", OLS_STOP, {});
     expect_golden("status", OLS_STATUS, {});
     expect_golden("clear_fault", OLS_CLEAR_FAULT, {});
+    expect_golden("reboot_to_bootloader", OLS_REBOOT_TO_BOOTLOADER, {});
     expect_golden("swap", OLS_SWAP, {});
 }
 
@@ -84,6 +85,7 @@ TEST(Wire, hello_and_its_reply) {
     reply.lamps_lit_max = 171;
     reply.lamp_duty_max_permille = 750;
     reply.edge_start_ticks = 7;
+    strcpy(reply.board, "pico");
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 

@@ -6,6 +6,7 @@ import zlib
 SYNC = 0x534C
 REPLY = 0x80
 HELLO, LOAD_BEGIN, LOAD_CHUNK, LOAD_END, ARM, START, STOP, STATUS, READ_TRIGGER_LOG, CLEAR_FAULT, SWAP = range(1, 12)
+REBOOT_TO_BOOTLOADER = 0x0D
 ERROR = 0x7F
 
 BASIS, TRACKING, MATTE, DARK = range(4)
@@ -15,7 +16,7 @@ FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost",
           "emergency stop", "over-temperature", "open lamp", "heartbeat")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI16s")
 ARM_REQUEST = struct.Struct("<IB3x")
 BY_COMMAND, BY_EDGE = range(2)
 STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")

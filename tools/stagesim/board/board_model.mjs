@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
+import { startsUsbBoot } from './boot_rom.mjs';
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
-import { PIN_MASK, STOP_INPUTS, TRIGGERS } from './pins.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
 
-const TRIGGER_MASK = TRIGGERS.reduce((mask, gpio) => mask | (1 << gpio), 0);
+const WATCHDOG_SCRATCH4 = 0x4005801c;
 
 export class Board {
   #image;
@@ -18,13 +18,15 @@ export class Board {
   #levels = 0;
   #boots = 0;
   #triggers = 0;
+  #triggerMask;
   #injections;
   #resetCause = null; // of a reset that is due
-  #inputs = new Map(Object.values(STOP_INPUTS).map((gpio) => [gpio, true])); // levels from outside, by GPIO
+  #inputs; // levels from outside, by GPIO
 
   /**
    * @param {object} image from readImage
    * @param {object} options
+   * @param {import('./pins.mjs').BoardPins} options.pins
    * @param {boolean} options.naive
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
@@ -37,9 +39,15 @@ export class Board {
   constructor(image, options) {
     this.#image = image;
     this.#options = options;
+    this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
+    this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = [...options.injections];
     this.#logger = onceLogger(options.log);
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
+  }
+
+  get pins() {
+    return this.#options.pins;
   }
 
   get chip() {
@@ -114,15 +122,22 @@ export class Board {
     };
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
-    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & PIN_MASK);
+    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
+    if (startsUsbBoot(scratch)) {
+      // Cleared by the boot ROM as it jumps. The loader's own USB device is not modelled: nobody answers.
+      this.chip.writeUint32(WATCHDOG_SCRATCH4, 0);
+      this.hang();
+      this.#options.log('in the USB boot loader, which is not emulated; a reset starts the image again');
+      return;
+    }
     boot(this.chip, this.#image);
   }
 
   #edge(tick, levels) {
     if (levels === this.#levels) return;
-    if (levels & ~this.#levels & TRIGGER_MASK) {
+    if (levels & ~this.#levels & this.#triggerMask) {
       this.#triggers++;
       if (this.#injections.some(({ trigger }) => trigger <= this.#triggers)) this.#parts.lockstep.stop();
     }
