@@ -16,7 +16,7 @@ help: ## list the verbs
 setup: ## install what is needed (apt, npm, pip); does nothing the second time
 	@tools/setup/install.sh
 
-firmware: setup ## build/firmware/stage.elf and stage.uf2
+firmware: setup ## build/firmware/BOARD/stage.elf and stage.uf2, of the default board in build/firmware, too
 	@$(MAKE) --no-print-directory -C firmware
 
 host: setup ## build/host/bin/{stagectl,rf,stagesim}

@@ -7,33 +7,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "board_pins.h"  // made from boards/BOARD.toml: pins, polarity, chain, limits
 #include "sequence.h"
-
-// Wiring (docs/architecture.md, "Pins"). All these pins are low at the PIO level when idle or dark.
-enum {
-    BOARD_PIN_DATA = 2,
-    BOARD_PIN_CLK = 3,
-    BOARD_PIN_TIMELINE = 4,  // the first of the timeline's eight: LATCH
-    BOARD_PIN_LIGHT_EN = 5,
-    BOARD_PIN_TRIG0 = 6,
-    BOARD_PINS_END = 12,
-    BOARD_PIN_STOP_INPUTS = 12,     // the first of BOARD_STOP_INPUTS, in the order of enum board_stop_input
-    BOARD_PIN_GENLOCK = 15,         // its rise can start play
-    BOARD_LIGHT_EN_ACTIVE_LOW = 0,  // 1: the pad is inverted and pulled up, for drivers with an OE input
-    BOARD_CHAIN_BITS = 176,         // 11 drivers of 16 outputs: 156 lamps, 6 on the matte board, spares
-    BOARD_SHIFT_DIVIDER = 1         // 17.9 MHz; 2 for drivers or wiring that need 8.9 MHz
-};
 
 // Inputs that must be high for anything to be lit. They are pulled down, so that an open wire stops; an input that nothing
 // is connected to is wired to 3.3 V.
 enum board_stop_input { BOARD_EMERGENCY_STOP, BOARD_OVER_TEMPERATURE, BOARD_OPEN_LAMP, BOARD_STOP_INPUTS };
-
-// What supply and lamps stand. docs/hardware.md of a stage has the reasons for its own.
-enum {
-    BOARD_LAMP_MA = 700,
-    BOARD_SUPPLY_MA = 120000,  // all 162 lamps at once, for tracking slots
-    BOARD_LAMP_DUTY_MAX_PERMILLE = 750
-};
 
 #define BOARD_TICK_HZ 125000000u
 #define BOARD_TICKS_PER_US (BOARD_TICK_HZ / 1000000u)

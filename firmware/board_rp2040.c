@@ -59,7 +59,8 @@ static void init_clocks(void) {
 static uint32_t inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN;
 
 static void set_pins(uint32_t function) {
-    for (uint32_t pin = BOARD_PIN_DATA; pin < BOARD_PINS_END; pin++) {
+    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
+        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
         // Both ways, so that the witness sees a trigger as the timeline plays it.
         const uint32_t inversion = inverted_pins >> pin & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
         GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | inversion;
@@ -78,7 +79,8 @@ void board_connect_pins(uint8_t inverted_triggers) {
 
 static void init_pins(void) {
     board_dark();
-    for (uint32_t pin = BOARD_PIN_DATA; pin < BOARD_PINS_END; pin++) {
+    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
+        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
         const bool pull_up = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
         PAD_GPIO(pin) = PAD_INPUT | PAD_4MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
     }

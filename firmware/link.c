@@ -54,7 +54,8 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
         .slot_gap_ticks = slot_gap_ticks(),
         .lamps_lit_max = board_sequence.limits.lamps_lit_max,
         .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
-        .edge_start_ticks = TIMELINE_EDGE_START_TICKS};
+        .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
+        .board = BOARD_NAME};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }

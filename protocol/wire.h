@@ -86,6 +86,7 @@ struct ols_hello_reply {
     uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
     uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
     uint32_t edge_start_ticks;        // from the rise of GENLOCK to the begin of the first cycle
+    char board[16];                   // whose pins this firmware drives, zero-terminated: "pico", "feather_can"
 } OLS_PACKED;
 
 // One camera trigger. All zero: fires with the light, as long as the exposure, in every slot that asks for it.
@@ -338,7 +339,7 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 72, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 88, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");

@@ -25,6 +25,12 @@ def test_hello_tells_layout_chain_and_clock(emulated):
     assert hello["board_id"] == b"OLS-VIRT"
 
 
+@pytest.mark.parametrize("name", ("pico", "feather_can"))
+def test_hello_names_the_board_whose_pins_the_image_drives(emulated, name):
+    hello = emulated(image=ROOT / "build/firmware" / name / "stage.elf").plug().hello(0)
+    assert hello["board"].rstrip(b"\0").decode() == name
+
+
 def test_a_host_of_another_layout_still_learns_the_boards_hash_and_can_refuse(emulated, tmp_path):
     changed = tmp_path / "wire.h"
     changed.write_text(WIRE_H.read_text().replace("uint32_t exposure_ticks;", "uint64_t exposure_ticks;"))

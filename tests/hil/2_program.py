@@ -33,7 +33,7 @@ def test_every_trigger_and_shift_word_of_two_cycles_is_right_by_two_checkers(emu
     (tmp_path / "program.json").write_text(json.dumps(program))
     result = subprocess.run([sys.executable, ROOT / "tests/hil/check_trace.py", board.trace, tmp_path / "program.json"],
                             capture_output=True, text=True)
-    (report,) = json.loads(result.stdout)
+    report = json.loads(result.stdout)
     assert result.returncode == 0 and report["right"], report
     assert report["own"]["triggers"] == report["sigrok"]["triggers"] == 360
     assert report["own"]["shift_words_checked"] == report["sigrok"]["shift_words_checked"] == 360
@@ -133,3 +133,20 @@ def test_a_program_that_cannot_be_played_is_refused_with_its_slot(emulated, dama
     with pytest.raises(BoardError) as refused:
         emulated().plug().load(program)
     assert refused.value.slot == 3 and message in refused.value.text
+
+
+def test_the_image_of_another_board_plays_the_same_on_its_own_pins(emulated):
+    program = paper_program(cycles=1, slots=18)
+    board = emulated(trace=True, image=ROOT / "build/firmware/feather_can/stage.uf2")
+    play_to_the_end(board, program)
+    board.stop()
+    assert check_trace.check(board.trace, program)["right"]
+
+
+def test_an_image_connected_as_another_board_reaches_no_lamp(emulated):
+    board = emulated("--board", "pico", trace=True, image=ROOT / "build/firmware/feather_can/stage.uf2")
+    link = board.plug()
+    with pytest.raises(BoardError, match="emergency stop"):  # its input is on another pin there
+        link.play(paper_program(cycles=1, slots=18))
+    board.stop()
+    assert not any(level for _, name, level in check_trace.read_vcd(board.trace) if name in ("LATCH", "LIGHT_EN"))

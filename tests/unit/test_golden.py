@@ -34,8 +34,9 @@ TRIGGERS = trigger(-2000, 0, 0, 0) + trigger(100, 6250, 0b1101, 1) + 2 * trigger
 # name: (type, payload), all with request id 0x1234.
 MESSAGES = {
     'hello': (0x01, struct.pack('<Q', HASH)),
-    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHHI', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
-                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750, 7)),
+    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHHI16s', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
+                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750, 7,
+                                              fixed('pico', 16))),
     'load_begin': (0x02, struct.pack('<HHIIII', 2, 176, 1000, len(PROGRAM), zlib.crc32(PROGRAM), 2500) + TRIGGERS),
     'load_begin_reply': (0x02 | REPLY, b''),
     'load_chunk': (0x03, struct.pack('<I', 0) + PROGRAM),

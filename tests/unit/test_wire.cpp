@@ -84,6 +84,7 @@ TEST(Wire, hello_and_its_reply) {
     reply.lamps_lit_max = 171;
     reply.lamp_duty_max_permille = 750;
     reply.edge_start_ticks = 7;
+    strcpy(reply.board, "pico");
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
 

@@ -116,7 +116,7 @@ class Link:
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
                  "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille",
-                 "edge_start_ticks")
+                 "edge_start_ticks", "board")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 

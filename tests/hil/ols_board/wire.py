@@ -15,7 +15,7 @@ FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost",
           "emergency stop", "over-temperature", "open lamp", "heartbeat")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI16s")
 ARM_REQUEST = struct.Struct("<IB3x")
 BY_COMMAND, BY_EDGE = range(2)
 STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")

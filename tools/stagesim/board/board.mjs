@@ -7,6 +7,7 @@ import { ExposureSocket } from './exposure_socket.mjs';
 import { readImage } from './image.mjs';
 import { parseOptions, USAGE } from './options.mjs';
 import { Pacer } from './pacer.mjs';
+import { boardPins } from './pins.mjs';
 import { UsbSocket } from './usb_socket.mjs';
 import { VcdWriter } from './vcd.mjs';
 
@@ -20,11 +21,14 @@ async function main() {
   }
   const log = (text) => process.stderr.write(`board: ${text}\n`);
   const image = readImage(options.image);
-  const vcd = options.vcd ? new VcdWriter(options.vcd) : null;
+  const pins = boardPins(options.board ?? boardOf(image));
+  const vcd = options.vcd ? new VcdWriter(options.vcd, pins) : null;
   const stage = options.exposures ? await ExposureSocket.open(options.exposures, options.pace === 'wall') : null;
-  const recorder = stage ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), options.activeLow) : null;
+  const recorder = stage
+    ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), pins, options.activeLow) : null;
 
   const board = new Board(image, {
+    pins,
     naive: options.naive,
     seed: options.seed,
     uniqueId: options.boardId,
@@ -58,6 +62,11 @@ async function main() {
   vcd?.close(board.tick);
   await stage?.end();
   if (options.stats) process.stderr.write(`${JSON.stringify({ ...pacer.statistics, dropped: stage?.dropped ?? 0 })}\n`);
+}
+
+function boardOf(image) {
+  if (image.label === null) throw new Error(`${image.name}: does not say which board it is for; say so with --board`);
+  return image.label.board;
 }
 
 main().catch((error) => {

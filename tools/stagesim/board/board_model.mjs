@@ -3,11 +3,8 @@
 // faults that are due.
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
-import { PIN_MASK, STOP_INPUTS, TRIGGERS } from './pins.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
-
-const TRIGGER_MASK = TRIGGERS.reduce((mask, gpio) => mask | (1 << gpio), 0);
 
 export class Board {
   #image;
@@ -18,13 +15,15 @@ export class Board {
   #levels = 0;
   #boots = 0;
   #triggers = 0;
+  #triggerMask;
   #injections;
   #resetCause = null; // of a reset that is due
-  #inputs = new Map(Object.values(STOP_INPUTS).map((gpio) => [gpio, true])); // levels from outside, by GPIO
+  #inputs; // levels from outside, by GPIO
 
   /**
    * @param {object} image from readImage
    * @param {object} options
+   * @param {import('./pins.mjs').BoardPins} options.pins
    * @param {boolean} options.naive
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
@@ -37,9 +36,15 @@ export class Board {
   constructor(image, options) {
     this.#image = image;
     this.#options = options;
+    this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
+    this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = [...options.injections];
     this.#logger = onceLogger(options.log);
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
+  }
+
+  get pins() {
+    return this.#options.pins;
   }
 
   get chip() {
@@ -114,7 +119,7 @@ export class Board {
     };
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
-    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & PIN_MASK);
+    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     boot(this.chip, this.#image);
@@ -122,7 +127,7 @@ export class Board {
 
   #edge(tick, levels) {
     if (levels === this.#levels) return;
-    if (levels & ~this.#levels & TRIGGER_MASK) {
+    if (levels & ~this.#levels & this.#triggerMask) {
       this.#triggers++;
       if (this.#injections.some(({ trigger }) => trigger <= this.#triggers)) this.#parts.lockstep.stop();
     }

@@ -2,7 +2,6 @@
 // From the board's edges to exposures: while a trigger is high its camera exposes, and sees the latched pattern
 // whenever LIGHT_EN is high.
 import { Chain } from './chain.mjs';
-import { PINS, TRIGGERS } from './pins.mjs';
 
 /**
  * @typedef {{on: number, off: number, bits: string}} Segment ticks, and the pattern as hex digits
@@ -14,16 +13,22 @@ export class ExposureRecorder {
   #levels = 0;
   #count = 0;
   #litSince = 0; // tick from which LIGHT_EN has been high with this pattern
-  #open = TRIGGERS.map(() => null);
+  #outputs;
+  #triggers;
+  #open;
   #activeLow;
   #emit;
 
   /**
    * @param {(exposure: Exposure) => void} emit called when a trigger ends
+   * @param {import('./pins.mjs').BoardPins} pins
    * @param {number[]} activeLow triggers whose camera exposes while the pin is low
    */
-  constructor(chainBits, emit, activeLow = []) {
-    this.#activeLow = activeLow.reduce((mask, trigger) => mask | (1 << TRIGGERS[trigger]), 0);
+  constructor(chainBits, emit, pins, activeLow = []) {
+    this.#outputs = pins.outputs;
+    this.#triggers = pins.triggers;
+    this.#open = pins.triggers.map(() => null);
+    this.#activeLow = activeLow.reduce((mask, trigger) => mask | (1 << pins.triggers[trigger]), 0);
     this.#chain = new Chain(chainBits);
     this.#emit = emit;
   }
@@ -40,14 +45,14 @@ export class ExposureRecorder {
     const rose = levels & ~before;
     const changed = levels ^ before;
     this.#levels = levels;
-    const light = 1 << PINS.LIGHT_EN;
-    const latched = (rose >> PINS.LATCH) & 1;
+    const light = 1 << this.#outputs.LIGHT_EN;
+    const latched = (rose >> this.#outputs.LATCH) & 1;
     if ((changed & light || latched) && before & light) this.#endStretch(tick);
     if (latched) this.#chain.latch();
     // The register takes DATA as it was before the edge: a change in the same tick comes too late (setup time).
-    if ((rose >> PINS.CLK) & 1) this.#chain.clock((before >> PINS.DATA) & 1);
+    if ((rose >> this.#outputs.CLK) & 1) this.#chain.clock((before >> this.#outputs.DATA) & 1);
     if ((rose & light) !== 0 || latched) this.#litSince = tick;
-    TRIGGERS.forEach((gpio, trigger) => {
+    this.#triggers.forEach((gpio, trigger) => {
       if ((changed >> gpio) & 1) this.#triggerEdge(tick, trigger, (levels >> gpio) & 1);
     });
   }
@@ -59,7 +64,7 @@ export class ExposureRecorder {
     }
     const exposure = this.#open[trigger];
     this.#open[trigger] = null;
-    if (this.#levels & (1 << PINS.LIGHT_EN)) addSegment(exposure, this.#litSince, tick, this.#chain.pattern);
+    if (this.#levels & (1 << this.#outputs.LIGHT_EN)) addSegment(exposure, this.#litSince, tick, this.#chain.pattern);
     exposure.fall = tick;
     exposure.n = this.#count++;
     this.#emit(exposure);

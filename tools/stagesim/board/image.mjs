@@ -7,13 +7,16 @@ import { basename } from 'node:path';
 const FLASH_START = 0x10000000;
 const FLASH_END = 0x11000000;
 const BOOT2_BYTES = 256;
+const LABEL_ADDRESS = 0x10000108; // protocol/image_label.h
+const LABEL_BYTES = 56;
+const LABEL_MAGIC = 0x62614c4f;
 const UF2_BLOCK = 512;
 const UF2_FAMILY_RP2040 = 0xe48bff56;
 
 /** @typedef {{address: number, bytes: Uint8Array}} Piece of flash */
 
 /**
- * @returns {{name: string, pieces: Piece[]}} with every byte in flash and a boot2 the boot ROM would accept
+ * @returns {{name: string, pieces: Piece[], label: {board: string, version: string} | null}} with every byte in flash and a boot2 the boot ROM would accept
  * @throws {Error} naming the file and what is wrong with it
  */
 export function readImage(path) {
@@ -32,7 +35,19 @@ export function readImage(path) {
   }
   checkBoot2(path, pieces);
   const digest = createHash('sha256').update(bytes).digest('hex').slice(0, 12);
-  return { name: `${basename(path)} ${digest}`, pieces };
+  return { name: `${basename(path)} ${digest}`, pieces, label: readLabel(pieces) };
+}
+
+/** What the image says of itself (protocol/image_label.h); null without a label. */
+function readLabel(pieces) {
+  const label = Buffer.alloc(LABEL_BYTES);
+  for (const { address, bytes } of pieces) {
+    const at = address - LABEL_ADDRESS; // of the piece in the label
+    if (at < LABEL_BYTES) label.set(bytes.subarray(Math.max(0, -at), Math.max(0, LABEL_BYTES - at)), Math.max(0, at));
+  }
+  if (label.readUInt32LE(0) !== LABEL_MAGIC) return null;
+  const text = (from, bytes) => label.toString('latin1', from, from + bytes).replace(/\0.*$/s, '');
+  return { board: text(16, 16), version: text(32, 24) };
 }
 
 /** Copies the image into the chip's flash, and starts the core as boot2 does (RP2040 datasheet 2.8.1). */

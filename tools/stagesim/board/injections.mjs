@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Faults that tests inject into the emulated board, at a tick or at a trigger.
 import { starveDma } from './dma.mjs';
-import { GENLOCK, STOP_INPUTS } from './pins.mjs';
 import { raiseHardFault } from './processor.mjs';
 import { Cause } from './system.mjs';
 
@@ -13,12 +12,12 @@ const FAULTS = {
   hardfault: (board) => raiseHardFault(board.chip),
   starve: (board) => starveDma(board.chip),
   unplug: (board) => board.unplug(),
-  estop: (board) => board.drive(STOP_INPUTS.ESTOP, false),
-  overtemperature: (board) => board.drive(STOP_INPUTS.OVER_TEMPERATURE, false),
-  openlamp: (board) => board.drive(STOP_INPUTS.OPEN_LAMP, false),
-  genlock: (board) => board.drive(GENLOCK, true),
-  genlockfall: (board) => board.drive(GENLOCK, false),
-  release: (board) => Object.values(STOP_INPUTS).forEach((gpio) => board.drive(gpio, true)),
+  estop: (board) => board.drive(board.pins.stopInputs.ESTOP, false),
+  overtemperature: (board) => board.drive(board.pins.stopInputs.OVER_TEMPERATURE, false),
+  openlamp: (board) => board.drive(board.pins.stopInputs.OPEN_LAMP, false),
+  genlock: (board) => board.drive(board.pins.genlock, true),
+  genlockfall: (board) => board.drive(board.pins.genlock, false),
+  release: (board) => Object.values(board.pins.stopInputs).forEach((gpio) => board.drive(gpio, true)),
 };
 
 /**

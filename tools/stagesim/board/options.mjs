@@ -8,6 +8,7 @@ export const USAGE = `usage: node board.mjs --image FILE [options]
 Runs the board's firmware, the same image that is flashed, on an emulated RP2040.
 
   --image FILE        firmware, .elf or .uf2
+  --board NAME        whose pins to connect: pico or feather_can (default: the board that the image says it is for)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
   --exposures SOCKET  connect there and send every exposure as a JSON line
   --vcd FILE          write the board's signals as a value change dump
@@ -37,7 +38,7 @@ export function parseOptions(args) {
     ({ values } = parseArgs({
       args,
       options: {
-        image: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
+        image: text, board: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },

@@ -1,11 +1,30 @@
 // SPDX-License-Identifier: MIT
-// The board's signals and their GPIOs (docs/architecture.md, "Pins").
-export const PINS = Object.freeze({
-  DATA: 2, CLK: 3, LATCH: 4, LIGHT_EN: 5, TRIG0: 6, TRIG1: 7, TRIG2: 8, TRIG3: 9, SYNC: 10,
-});
-/** Inputs that stop everything unless they are high: wired to a closed emergency stop and healthy drivers. */
-export const STOP_INPUTS = Object.freeze({ ESTOP: 12, OVER_TEMPERATURE: 13, OPEN_LAMP: 14 });
-/** The input whose rise can start play. */
-export const GENLOCK = 15;
-export const TRIGGERS = Object.freeze([PINS.TRIG0, PINS.TRIG1, PINS.TRIG2, PINS.TRIG3]);
-export const PIN_MASK = Object.values(PINS).reduce((mask, gpio) => mask | (1 << gpio), 0);
+// Which signal is on which GPIO of a board: boards.json, made by firmware/tools/board_pins.py from firmware/boards/.
+import { readFileSync } from 'node:fs';
+
+const BOARDS = JSON.parse(readFileSync(new URL('boards.json', import.meta.url), 'utf8'));
+
+/**
+ * @typedef {object} BoardPins
+ * @property {string} name
+ * @property {Record<string, number>} outputs GPIO by signal, as in traces
+ * @property {Record<string, number>} stopInputs stop everything unless they are high: emergency stop, healthy drivers
+ * @property {number} genlock the input whose rise can start play
+ * @property {number[]} triggers GPIOs of TRIG0 to TRIG3
+ * @property {number} mask bit n: GPIO n is an output
+ */
+
+/**
+ * @returns {BoardPins}
+ * @throws {Error} naming the boards there are
+ */
+export function boardPins(name) {
+  const board = Object.hasOwn(BOARDS, name) ? BOARDS[name] : null;
+  if (board === null) throw new Error(`no board "${name}"; there are: ${Object.keys(BOARDS).join(', ')}`);
+  const { outputs, stopInputs, inputs } = board;
+  return Object.freeze({
+    name, outputs, stopInputs, genlock: inputs.GENLOCK,
+    triggers: [outputs.TRIG0, outputs.TRIG1, outputs.TRIG2, outputs.TRIG3],
+    mask: Object.values(outputs).reduce((mask, gpio) => mask | (1 << gpio), 0),
+  });
+}

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Writes the board's signals as a value change dump (IEEE 1364-2005, 18.2): times in ns, all multiples of 8.
 import { closeSync, openSync, writeSync } from 'node:fs';
-import { PINS } from './pins.mjs';
 
 const TICK_NS = 8;
 const BUFFER_CHARS = 1 << 16;
@@ -12,11 +11,15 @@ export class VcdWriter {
   #text = '';
   #levels = 0;
   #tick = 0;
-  #signals = Object.entries(PINS).map(([name, gpio], n) => ({ name, gpio, id: String.fromCharCode(33 + n) }));
+  #signals;
 
-  /** @throws {Error} naming the file if it cannot be written */
-  constructor(path) {
+  /**
+   * @param {import('./pins.mjs').BoardPins} pins
+   * @throws {Error} naming the file if it cannot be written
+   */
+  constructor(path, pins) {
     this.#path = path;
+    this.#signals = Object.entries(pins.outputs).map(([name, gpio], n) => ({ name, gpio, id: String.fromCharCode(33 + n) }));
     try {
       this.#file = openSync(path, 'w');
     } catch (error) {

@@ -9,9 +9,11 @@ import { Chain } from '../chain.mjs';
 import { ExposureRecorder } from '../exposures.mjs';
 import { crc32Mpeg2, readImage } from '../image.mjs';
 import { parseOptions } from '../options.mjs';
-import { PINS } from '../pins.mjs';
+import { boardPins } from '../pins.mjs';
 import { VcdWriter } from '../vcd.mjs';
 
+const pico = boardPins('pico');
+const PINS = pico.outputs;
 const directory = mkdtempSync(join(tmpdir(), 'ols'));
 after(() => rmSync(directory, { recursive: true }));
 
@@ -37,7 +39,7 @@ describe('exposures', () => {
   /** Plays [tick, pin, level] edges on a chain of 8 bits; returns the exposures. */
   function record(edges) {
     const exposures = [];
-    const recorder = new ExposureRecorder(8, (exposure) => exposures.push(exposure));
+    const recorder = new ExposureRecorder(8, (exposure) => exposures.push(exposure), pico);
     let levels = 0;
     for (const [tick, pin, level] of edges) {
       levels = level ? levels | (1 << PINS[pin]) : levels & ~(1 << PINS[pin]);
@@ -77,7 +79,7 @@ describe('exposures', () => {
     let seen = '';
     const late = new ExposureRecorder(8, ({ segments }) => {
       seen = segments[0].bits;
-    });
+    }, pico);
     for (const [tick, levels] of [[1, both], [2, 0], [3, 1 << PINS.LATCH], [4, 0],
                                   [5, (1 << PINS.TRIG0) | (1 << PINS.LIGHT_EN)], [6, 0]]) {
       late.edge(tick, levels);
@@ -88,7 +90,7 @@ describe('exposures', () => {
 
 test('the trace has nanoseconds, initial values and one line for each change', () => {
   const path = join(directory, 'trace.vcd');
-  const vcd = new VcdWriter(path);
+  const vcd = new VcdWriter(path, pico);
   vcd.edge(10, 1 << PINS.TRIG0);
   vcd.edge(10, (1 << PINS.TRIG0) | (1 << PINS.LIGHT_EN));
   vcd.edge(25, 1 << PINS.LIGHT_EN);
