@@ -14,6 +14,14 @@
 // is connected to is wired to 3.3 V.
 enum board_stop_input { BOARD_EMERGENCY_STOP, BOARD_OVER_TEMPERATURE, BOARD_OPEN_LAMP, BOARD_STOP_INPUTS };
 
+// On the CAN bus: which of up to 16 boards this one is, and the bit rate, 1000 or 500.
+#ifndef BOARD_CAN_NUMBER
+#define BOARD_CAN_NUMBER 0
+#endif
+#ifndef BOARD_CAN_KBIT_S
+#define BOARD_CAN_KBIT_S 1000
+#endif
+
 #define BOARD_TICK_HZ 125000000u
 #define BOARD_TICKS_PER_US (BOARD_TICK_HZ / 1000000u)
 #define BOARD_FIRMWARE_VERSION "0.1.0"

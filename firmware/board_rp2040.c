@@ -16,7 +16,7 @@ enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
 static volatile bool woken;
 static bool reset_by_watchdog;
 
-static void release_reset(uint32_t blocks) {
+void board_release_reset(uint32_t blocks) {
     REGISTER_SET(RESETS_RESET) = blocks;  // known state, also after a jump from a debugger
     REGISTER_CLEAR(RESETS_RESET) = blocks;
     while (~RESETS_RESET_DONE & blocks) {
@@ -46,7 +46,7 @@ static void init_clocks(void) {
     CLK_REF_CTRL = CLK_REF_SRC_XOSC;
     while (!(CLK_REF_SELECTED & 1 << CLK_REF_SRC_XOSC)) {
     }
-    release_reset(RESET_PLL_SYS | RESET_PLL_USB);
+    board_release_reset(RESET_PLL_SYS | RESET_PLL_USB);
     start_pll(PLL_SYS_BASE, 125, 6, 2);  // 1500 MHz / 12 = 125 MHz
     start_pll(PLL_USB_BASE, 100, 5, 5);  // 1200 MHz / 25 = 48 MHz
     REGISTER_SET(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
@@ -93,10 +93,10 @@ static void init_pins(void) {
 }
 
 void board_init(void) {
-    release_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
+    board_release_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
     init_pins();
     init_clocks();
-    release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
+    board_release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
     BUSCTRL_BUS_PRIORITY = BUS_PRIORITY_DMA;  // the processor waits rather than a FIFO
     TIMER_INTE = 1;
     reset_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH(3) == RUNNING_MAGIC;
@@ -132,6 +132,32 @@ uint64_t board_time_us(void) {
 void board_wake_interrupt(void) {
     NVIC_ICER = WAKE_INTERRUPTS;
     woken = true;
+}
+
+void board_wake(void) {
+    woken = true;
+}
+
+void board_gpio_interrupt(void) {
+    const uint32_t edge = GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) & GPIO_INTE(BOARD_PIN_CAN_INTERRUPT) &
+                          GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    if (edge) {
+        GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = edge;
+        board_raise_can_interrupt();
+    } else {
+        board_wake_interrupt();
+    }
+}
+
+void board_watch_can_interrupt(void) {
+    GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_CAN_INTERRUPT)) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    NVIC_IPR(IRQ_CAN) = NVIC_PRIORITY(IRQ_CAN, 3);
+    NVIC_ISER = 1u << IRQ_CAN;
+}
+
+void board_raise_can_interrupt(void) {
+    NVIC_ISPR = 1u << IRQ_CAN;
 }
 
 void board_sleep(void) {

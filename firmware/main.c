@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The firmware's one loop. Light and triggers do not wait for it: PIO plays them (pulse.pio), and stops dark by itself.
 #include "board.h"
+#include "can.h"
 #include "fault.h"
 #include "link.h"
 #include "player.h"
 #include "stage.h"
-#include "transport.h"
 #include "usb.h"
 #include "witness.h"
 
@@ -16,10 +16,12 @@ int main(void) {
     fault_init();
     stage_init();
     usb_init();
+    can_init();
     for (;;) {
         board_feed_watchdog();
         usb_poll();
-        stage_poll(transport_is_attached());
+        can_poll();
+        stage_poll(link_host_is_there());
         if (!link_poll()) board_sleep();
     }
 }

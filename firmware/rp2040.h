@@ -21,6 +21,8 @@ enum {
     RESET_PIO1 = 1 << 11,
     RESET_PLL_SYS = 1 << 12,
     RESET_PLL_USB = 1 << 13,
+    RESET_SPI0 = 1 << 16,
+    RESET_SPI1 = 1 << 17,
     RESET_TIMER = 1 << 21,
     RESET_USBCTRL = 1 << 24
 };
@@ -54,11 +56,12 @@ enum { PLL_PWR_PD = 1 << 0, PLL_PWR_POSTDIVPD = 1 << 3, PLL_PWR_VCOPD = 1 << 5 }
 #define CLK_REF_SELECTED REGISTER(0x40008038)
 #define CLK_SYS_CTRL 0x4000803c
 #define CLK_SYS_SELECTED REGISTER(0x40008044)
+#define CLK_PERI_CTRL REGISTER(0x40008048)
 #define CLK_USB_CTRL REGISTER(0x40008054)
 enum {
     CLK_REF_SRC_XOSC = 2,
     CLK_SYS_SRC_AUX = 1,  // the auxiliary source after reset is PLL_SYS
-    CLK_ENABLE = 1 << 11  // for clk_usb, whose source after reset is PLL_USB
+    CLK_ENABLE = 1 << 11  // for clk_usb and clk_peri, whose sources after reset are PLL_USB and clk_sys
 };
 
 // Watchdog (4.7.6)
@@ -88,9 +91,13 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 #define GPIO_EDGE_LOW(pin) (4u << 4 * ((pin) % 8))
 #define GPIO_EDGE_HIGH(pin) (8u << 4 * ((pin) % 8))
 enum {
+    GPIO_FUNCTION_SPI = 1,
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
+    GPIO_FUNCTION_NONE = 31,
     GPIO_OUTPUT_INVERTED = 1 << 8,
+    GPIO_OUTPUT_LOW = 2 << 8,
+    GPIO_OUTPUT_HIGH = 3 << 8,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
     GPIO_INPUT_INVERTED = 1 << 16,
     PAD_SCHMITT = 1 << 1,
@@ -111,6 +118,14 @@ enum { QSPI_SS_AUTO = 0, QSPI_SS_LOW = 2 << 8, QSPI_SS_HIGH = 3 << 8 };
 #define SSI_SR REGISTER(0x18000028)
 #define SSI_DR0 REGISTER(0x18000060)
 enum { SSI_8_BITS_BOTH_WAYS = 7 << 16, SSI_SR_RECEIVED = 1 << 3 };
+
+// SPI, ARM PL022 (4.4.4)
+#define SPI_CR0(block) REGISTER(0x4003c000 + 0x4000 * (block))
+#define SPI_CR1(block) REGISTER(0x4003c004 + 0x4000 * (block))
+#define SPI_DR(block) REGISTER(0x4003c008 + 0x4000 * (block))
+#define SPI_SR(block) REGISTER(0x4003c00c + 0x4000 * (block))
+#define SPI_CPSR(block) REGISTER(0x4003c010 + 0x4000 * (block))
+enum { SPI_8_BITS = 7, SPI_MODE_1_1 = 3 << 6, SPI_ENABLE = 1 << 1, SPI_SR_RECEIVED = 1 << 2 };
 
 // Bus priority (2.1.5)
 #define BUSCTRL_BUS_PRIORITY REGISTER(0x40030000)
@@ -224,9 +239,13 @@ enum {
 // Cortex-M0+ (2.4.8)
 #define NVIC_ISER REGISTER(0xe000e100)
 #define NVIC_ICER REGISTER(0xe000e180)
+#define NVIC_ISPR REGISTER(0xe000e200)
+// Two bits each, highest in a byte: 0 interrupts 1, and so on
+#define NVIC_IPR(interrupt) REGISTER(0xe000e400 + (interrupt) / 4 * 4)
+#define NVIC_PRIORITY(interrupt, priority) ((uint32_t)(priority) << (8 * ((interrupt) % 4) + 6))
 #define SCB_VTOR REGISTER(0xe000ed08)
 
-// Interrupts (2.3.2)
-enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_GPIO = 13, IRQ_COUNT = 26 };
+// Interrupts (2.3.2). Nothing but software raises 26 to 31.
+enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_GPIO = 13, IRQ_CAN = 26, IRQ_COUNT = 27 };
 
 #endif

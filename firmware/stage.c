@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "board.h"
+#include "cycle_digest.h"
 #include "fault.h"
 #include "frame.h"
 #include "player.h"
@@ -103,6 +104,7 @@ static void end_play(enum ols_state ended) {
 
 static void end_in_fault(enum ols_fault cause, uint64_t ticks) {
     fault_latch(cause, trigger_log_slot(), ticks);
+    cycle_digest_end(false);
     forget_next();
     state = OLS_STATE_FAULT;
 }
@@ -137,6 +139,7 @@ static void follow_play(void) {
     if (events & PLAYER_DONE) {
         if (next == OLS_NEXT_SWAPPING) take_next();
         cycles_of_done = current->header.cycles;
+        cycle_digest_end(true);
         return end_play(OLS_STATE_DONE);
     }
     player_poll();
@@ -155,6 +158,10 @@ static enum ols_fault cause_from_outside(uint32_t stops, bool host_is_there) {
     return heartbeat_ticks != 0 && silent_ticks > heartbeat_ticks ? OLS_FAULT_HEARTBEAT : OLS_FAULT_NONE;
 }
 
+bool stage_is_armed(void) {
+    return state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
+}
+
 static void begin_play(void) {
     start_us = board_time_us();
     state = OLS_STATE_PLAYING;
@@ -163,7 +170,7 @@ static void begin_play(void) {
 void stage_poll(bool host_is_there) {
     const uint32_t stops = board_stop_inputs();  // in every state: an edge that nobody takes would not let it sleep
     board_forget_genlock();
-    if (state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) {
+    if (stage_is_armed()) {
         // First, for the program's own faults may be its consequences.
         const enum ols_fault cause = cause_from_outside(stops, host_is_there);
         if (cause != OLS_FAULT_NONE) {
@@ -252,8 +259,8 @@ enum stage_answer stage_load_end(struct ols_error_reply* error) {
     return answer;
 }
 
-void stage_begin_request(void) {
-    heard_us = board_time_us();
+void stage_begin_request(bool from_owner) {
+    if (from_owner) heard_us = board_time_us();
     checked_bytes = 0;
     checked_crc32 = 0;
 }
@@ -295,6 +302,7 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
         return STAGE_REFUSED;
     }
     heartbeat_ticks = arm->heartbeat_ticks;
+    heard_us = board_time_us();
     state = OLS_STATE_ARMED;
     return STAGE_OK;
 }
@@ -314,6 +322,7 @@ bool stage_stop(struct ols_error_reply* error) {
     const bool was_playing = state == OLS_STATE_PLAYING;
     end_play(OLS_STATE_LOADED);
     if (was_playing) read_witness();
+    cycle_digest_end(false);
     return true;
 }
 
@@ -356,9 +365,18 @@ bool stage_clear_fault(struct ols_error_reply* error) {
     return true;
 }
 
+static uint32_t cycles_played(void) {
+    return state == OLS_STATE_DONE ? cycles_of_done : trigger_log_cycle();
+}
+
+struct ols_canbus_state stage_summary(void) {
+    const struct fault fault = fault_latched();
+    return (struct ols_canbus_state){
+        .state = (uint8_t)state, .fault = (uint8_t)fault.cause, .fault_slot = fault.slot, .cycles_played = cycles_played()};
+}
+
 void stage_status(struct ols_status_reply* status) {
     const struct fault fault = fault_latched();
-    const bool done = state == OLS_STATE_DONE;
     *status = (struct ols_status_reply){.state = (uint8_t)state,
                                         .fault = (uint8_t)fault.cause,
                                         .fault_slot = fault.slot,
@@ -366,7 +384,7 @@ void stage_status(struct ols_status_reply* status) {
                                         .fault_ticks = fault.ticks,
                                         .now_ticks = state == OLS_STATE_PLAYING ? ticks_since_start() : 0,
                                         .triggers_fired = trigger_log_fired(),
-                                        .cycles_played = done ? cycles_of_done : trigger_log_cycle(),
+                                        .cycles_played = cycles_played(),
                                         .log_entries_lost = trigger_log_lost(),
                                         .program_crc32 = current->header.program_crc32,
                                         .next = (uint8_t)next};

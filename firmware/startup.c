@@ -46,6 +46,7 @@ __attribute__((aligned(256))) const vector vectors[16 + IRQ_COUNT] = {
     [17 + IRQ_USBCTRL... 15 + IRQ_PIO0_0] = {.handler = unexpected_exception},
     [16 + IRQ_PIO0_0] = {.handler = board_wake_interrupt},
     [17 + IRQ_PIO0_0... 15 + IRQ_GPIO] = {.handler = unexpected_exception},
-    [16 + IRQ_GPIO] = {.handler = board_wake_interrupt},
-    [17 + IRQ_GPIO... 15 + IRQ_COUNT] = {.handler = unexpected_exception},
+    [16 + IRQ_GPIO] = {.handler = board_gpio_interrupt},
+    [17 + IRQ_GPIO... 15 + IRQ_CAN] = {.handler = unexpected_exception},
+    [16 + IRQ_CAN] = {.handler = mcp2515_interrupt},
 };

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "rp2040.h"
-#include "transport.h"
 
 enum { ENDPOINT_OUT = 1, ENDPOINT_IN = 2, PACKET_BYTES = TRANSPORT_PACKET_BYTES };
 enum { BUFFER_EP0 = 0x100, BUFFER_OUT = 0x180, BUFFER_IN = 0x1c0 };  // in the controller's memory (4.1.2.5)
@@ -77,7 +76,7 @@ static const uint8_t language_descriptor[] = {4, DESCRIPTOR_STRING, 0x09, 0x04};
 static const char* const strings[] = {"open light stage", "light stage sequencer"};
 
 static bool configured;
-static uint32_t session;
+static uint32_t attachments;
 static uint8_t new_address;  // not zero: takes effect when the status stage is over
 static bool out_toggle, in_toggle;
 static size_t received_bytes;
@@ -148,7 +147,7 @@ static void set_configuration(uint16_t value) {
     reset_endpoints();
     configured = value == 1;
     if (!configured) return;
-    session++;
+    attachments++;
     USB_ENDPOINT_CONTROL_OUT(ENDPOINT_OUT) =
         USB_ENDPOINT_ENABLE | USB_ENDPOINT_INTERRUPT | USB_ENDPOINT_BULK | BUFFER_OUT;
     USB_ENDPOINT_CONTROL_IN(ENDPOINT_IN) = USB_ENDPOINT_ENABLE | USB_ENDPOINT_INTERRUPT | USB_ENDPOINT_BULK | BUFFER_IN;
@@ -248,15 +247,15 @@ void usb_poll(void) {
     }
 }
 
-bool transport_is_attached(void) {
+static bool is_attached(void) {
     return configured && !(USB_SIE_STATUS & USB_SIE_SUSPENDED);
 }
 
-uint32_t transport_session(void) {
-    return session;
+static uint32_t session(void) {
+    return attachments;
 }
 
-size_t transport_receive(uint8_t* bytes) {
+static size_t receive(uint8_t* bytes) {
     if (!received) return 0;
     for (size_t i = 0; i < received_bytes; i++) bytes[i] = buffer_at(BUFFER_OUT)[i];
     received = false;
@@ -265,12 +264,14 @@ size_t transport_receive(uint8_t* bytes) {
     return byte_count;
 }
 
-bool transport_can_send(void) {
+static bool can_send(void) {
     return configured && !in_busy && sending_bytes == 0;
 }
 
-void transport_send(const uint8_t* bytes, size_t byte_count) {
+static void send(const uint8_t* bytes, size_t byte_count) {
     sending = bytes;
     sending_bytes = byte_count;
     send_packet();
 }
+
+const struct transport usb_transport = {is_attached, session, receive, can_send, send};

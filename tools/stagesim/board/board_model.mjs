@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
+import { CanBoard } from './can_board.mjs';
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
@@ -18,6 +19,7 @@ export class Board {
   #triggerMask;
   #injections;
   #resetCause = null; // of a reset that is due
+  #can = null;
   #inputs; // levels from outside, by GPIO
 
   /**
@@ -28,6 +30,7 @@ export class Board {
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
+   * @param {import('./can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
    * @param {(cause: string) => void} options.onReset
@@ -40,6 +43,11 @@ export class Board {
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = [...options.injections];
     this.#logger = onceLogger(options.log);
+    if (options.canBus) {
+      if (options.pins.can === null) throw new Error(`board "${options.pins.name}" has no CAN controller`);
+      const drive = (gpio, level) => this.drive(gpio, level);
+      this.#can = new CanBoard(options.canBus, options.pins.can, { drive, log: (text) => this.#logger.warn('board', text) });
+    }
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
   }
 
@@ -62,7 +70,7 @@ export class Board {
 
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
   get quiet() {
-    return this.#parts.lockstep.quiet && !this.usbHost.active;
+    return this.#parts.lockstep.quiet && !this.usbHost.active && !this.#can?.bus.busy;
   }
 
   get nextAlarmTick() {
@@ -119,9 +127,13 @@ export class Board {
     };
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
-    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
+    this.#parts.pads.onChange = (cycle, levels, driven) => {
+      this.#can?.pinsChanged(levels, driven);
+      this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
+    };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
+    this.#can?.attach(this.chip);
     boot(this.chip, this.#image);
   }
 

@@ -57,8 +57,9 @@ export class CanBus {
     this.kick();
   }
 
-  /** True while a frame is on the wire or waits for it. */
+  /** True while a frame is on the wire or waits for it. A node that is alone calls in vain: that is rest. */
   get busy() {
+    if (this.#nodes.length < 2) return false;
     return this.#under !== null || this.#nodes.some((node) => node.bitRate !== 0 && node.next() !== null);
   }
 

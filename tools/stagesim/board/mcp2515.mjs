@@ -27,7 +27,7 @@ export class Mcp2515 {
     this.onInterrupt = () => {};
     this.transmitErrors = 0;
     this.receiveErrors = 0;
-    this.#reset();
+    this.reset();
     bus.add(this);
   }
 
@@ -59,7 +59,7 @@ export class Mcp2515 {
 
   #instruction(byte) {
     this.#step = () => 0; // what no instruction is has no answer
-    if (byte === 0xc0) this.#reset();
+    if (byte === 0xc0) this.reset();
     else if (byte === 0x03) this.#step = (address) => this.#beginReading(address);
     else if (byte === 0x02) this.#step = (address) => this.#beginWriting(address);
     else if (byte === 0x05) this.#step = (address) => this.#beginModifying(address);
@@ -146,11 +146,13 @@ export class Mcp2515 {
     return this.#registers[ADDRESS.CANSTAT] >> 5;
   }
 
-  #reset() {
+  /** By the instruction, or by the pin (chapter 9). */
+  reset() {
     this.#registers.set(RESET_VALUES);
     this.transmitErrors = this.receiveErrors = 0;
     this.#sending = -1;
     this.#recovery?.cancel();
+    this.#changed();
   }
 
   #read(address) {
@@ -213,6 +215,10 @@ export class Mcp2515 {
     this.#countersChanged();
     this.#bus.kick();
     this.#loopBack();
+  }
+
+  get interrupting() {
+    return this.#interrupt;
   }
 
   /** Interrupt pin: low while an enabled flag is up. */

@@ -10,6 +10,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --image FILE        firmware, .elf or .uf2
   --board NAME        whose pins to connect: pico or feather_can (default: the board that the image says it is for)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
+  --can SOCKET        fit a CAN controller, and listen there for nodes of its bus ("CAN frames over a socket")
+  --can-kbit-s N      the bus's bit rate (default 1000)
   --exposures SOCKET  connect there and send every exposure as a JSON line
   --vcd FILE          write the board's signals as a value change dump
   --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
@@ -38,7 +40,7 @@ export function parseOptions(args) {
     ({ values } = parseArgs({
       args,
       options: {
-        image: text, board: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
+        image: text, board: text, usb: text, can: text, 'can-kbit-s': { ...text, default: '1000' }, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
@@ -56,6 +58,7 @@ export function parseOptions(args) {
   return {
     ...values,
     chainBits,
+    canBitRate: 1000 * integer('--can-kbit-s', values['can-kbit-s'], 1),
     seed: integer('--seed', values.seed, 0),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
     activeLow: values['active-low'].map((text) => trigger(text)),
