@@ -12,9 +12,9 @@
 #include "stage.h"
 
 enum {
-    // A block of consecutive frames fits the ring of received frames with room for others, so that however long a turn of
-    // the main loop takes, no frame of a message is lost.
-    BLOCK_FRAMES = CAN_BUS_RECEIVED_MAX - 8,
+    // One block: the ring of received frames holds 3.5 ms of the fastest bus, five times the longest turn of the main loop,
+    // and every flow control more costs the host's answering time, often a millisecond.
+    BLOCK_FRAMES = 0,
     STATE_EVERY_US = 50000,
     HEALTH_EVERY_US = 1000000,
     OF_THIS_BOARD = 16 * BOARD_CAN_NUMBER
@@ -161,7 +161,9 @@ static bool can_send(void) {
 }
 
 static void send(const uint8_t* bytes, size_t byte_count) {
-    isotp_send(&isotp, bytes, (uint16_t)byte_count, board_time_us());
+    const uint64_t now_us = board_time_us();
+    isotp_send(&isotp, bytes, (uint16_t)byte_count, now_us);
+    send_frames(now_us);
 }
 
 const struct transport can_transport = {is_attached, session, receive, can_send, send};

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "device/can_transfer.hpp"
 #include "device/transfer.hpp"
 
 namespace ols {
@@ -141,7 +142,8 @@ Result<std::unique_ptr<Transfer>> open_socket(const std::string& path) {
 Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link) {
     constexpr std::string_view socket_scheme = "socket:";
     if (link.starts_with(socket_scheme)) return open_socket(link.substr(socket_scheme.size()));
-    return fail("'" + link + "' is no board link: write socket:PATH");
+    if (link.starts_with("can:") || link.starts_with("can-socket:")) return open_can(link);
+    return fail("'" + link + "' is no board link: write socket:PATH, can:IFACE or can-socket:PATH");
 }
 
 }  // namespace ols

@@ -25,7 +25,8 @@ class Transfer {
     virtual Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) = 0;
 };
 
-// "socket:PATH" is the emulated board's USB (docs/architecture.md, "USB transfers over a socket"). The error says what
+// "socket:PATH" is the emulated board's USB (docs/architecture.md, "USB transfers over a socket"), "can:IFACE" a SocketCAN
+// interface, "can-socket:PATH" the emulated CAN bus; "#N" behind a CAN link means board N instead of 0. The error says what
 // links there are, or to start the stage first when nobody listens.
 Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link);
 
