@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Board on Linux: board.h, player.h, witness.h and transport.h without hardware. Time passes when the test says so, and
+// Board on Linux: board.h, player.h, witness.h and the USB of usb.h without hardware. Time passes when the test says so, and
 // triggers fire at their scheduled ticks; what PIO makes of the words is not imitated here, but tested on its own.
 #include "board_host.h"
 
@@ -7,12 +7,13 @@
 #include <string.h>
 
 #include "board.h"
+#include "can.h"
 #include "fault.h"
 #include "link.h"
 #include "player.h"
 #include "pulse.h"
 #include "stage.h"
-#include "transport.h"
+#include "usb.h"
 #include "witness.h"
 
 enum { ANSWER_BYTES_MAX = 1 << 16 };
@@ -56,6 +57,7 @@ static void start_firmware(void) {
     player_stop();
     fault_init();
     stage_init();
+    can_init();
 }
 
 void board_host_power_up(void) {
@@ -70,7 +72,8 @@ void board_host_bite(void) {
 }
 
 static bool turn_main_loop(void) {
-    stage_poll(transport_is_attached());
+    can_poll();
+    stage_poll(link_host_is_there());
     return link_poll();
 }
 
@@ -282,17 +285,17 @@ uint32_t witness_stamp(uint32_t n) {
     return board.stamps[n % WITNESS_RING_STAMPS];
 }
 
-// transport.h
+// usb.h
 
-bool transport_is_attached(void) {
+static bool is_attached(void) {
     return board.attached;
 }
 
-uint32_t transport_session(void) {
+static uint32_t session(void) {
     return board.session;
 }
 
-size_t transport_receive(uint8_t* bytes) {
+static size_t receive(uint8_t* bytes) {
     const size_t byte_count =
         board.incoming_bytes < TRANSPORT_PACKET_BYTES ? board.incoming_bytes : TRANSPORT_PACKET_BYTES;
     if (byte_count == 0) return 0;
@@ -302,12 +305,14 @@ size_t transport_receive(uint8_t* bytes) {
     return byte_count;
 }
 
-bool transport_can_send(void) {
+static bool can_send(void) {
     return true;
 }
 
-void transport_send(const uint8_t* bytes, size_t byte_count) {
+static void send(const uint8_t* bytes, size_t byte_count) {
     if (board.answer_bytes + byte_count > sizeof board.answer) return;  // like a host that reads no more
     memcpy(board.answer + board.answer_bytes, bytes, byte_count);
     board.answer_bytes += byte_count;
 }
+
+const struct transport usb_transport = {is_attached, session, receive, can_send, send};

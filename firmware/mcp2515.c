@@ -31,7 +31,7 @@ enum {
     TXB0CTRL = 0x30,
     RXB0CTRL = 0x60
 };
-enum { RECEIVED_0 = 1, RECEIVED_1 = 2, SENT_0 = 4, ERROR = 0x20 };                  // CANINTE and CANINTF
+enum { RECEIVED_0 = 1, RECEIVED_1 = 2, SENT_0 = 4, ALL_SENT = 7 * SENT_0, ERROR = 0x20 };  // CANINTE and CANINTF
 enum { OVERFLOWS = 0xc0, BUS_OFF = 0x20, TRANSMIT_PASSIVE = 0x10 };                 // EFLG
 enum { MODE_NORMAL = 0x00, MODE_CONFIGURATION = 0x80, ABORT_ALL = 0x10, CTRL_RESET = 0x87 };  // CANCTRL, CANSTAT
 enum { RECEIVE_ROLLOVER = 0x04 };                                                   // RXB0CTRL
@@ -196,25 +196,30 @@ static void note_errors(uint8_t flags, uint8_t errors) {
     if (flags & ERROR) modify(CANINTF, ERROR, 0);
 }
 
+static bool wants_something(void) {
+    return !(GPIO_STATUS(BOARD_PIN_CAN_INTERRUPT) & GPIO_FROM_PAD);
+}
+
+static void serve(void) {
+    uint8_t state[2];  // CANINTF, EFLG
+    read_two(CANINTF, state);
+    // Buffer 0 first: buffer 1 has a frame only if it came while buffer 0 was full. Both are emptied again before another
+    // frame can be complete, 47 us at the least, so that their order is never in doubt.
+    if (state[0] & RECEIVED_0) take_received(0);
+    if (state[0] & RECEIVED_1) take_received(1);
+    const uint8_t sent = state[0] & ALL_SENT;
+    if (sent) {
+        modify(CANINTF, sent, 0);
+        free_buffers |= sent / SENT_0;
+        frames_sent++;
+    }
+    note_errors(state[0], state[1]);
+}
+
 void mcp2515_interrupt(void) {
     if (give_up) give_up_sending();
-    for (;;) {
-        uint8_t state[2];  // CANINTF, EFLG
-        read_two(CANINTF, state);
-        note_errors(state[0], state[1]);
-        // Buffer 0 first: buffer 1 has a frame only if it came while buffer 0 was full. Both are emptied again before
-        // another frame can be complete, 47 us at the least, so that their order is never in doubt.
-        if (state[0] & RECEIVED_0) take_received(0);
-        if (state[0] & RECEIVED_1) take_received(1);
-        const uint8_t sent = state[0] & (SENT_0 * ((1 << SEND_BUFFERS) - 1));
-        if (sent) {
-            modify(CANINTF, sent, 0);
-            free_buffers |= sent / SENT_0;
-            frames_sent++;
-        }
-        send_queued();
-        if (!(state[0] & (RECEIVED_0 | RECEIVED_1 | ERROR)) && !sent) break;
-    }
+    while (wants_something()) serve();
+    send_queued();
     board_wake();
 }
 
@@ -265,7 +270,7 @@ static void configure(unsigned board_number) {
     for (size_t i = 0; i < sizeof filters; i++) write(filters[i], filter, sizeof filter);
     for (size_t i = 0; i < sizeof masks; i++) write(masks[i], exact, sizeof exact);
     // CNF3, CNF2, CNF1, CANINTE
-    const uint8_t timing[] = {TIMING_3, TIMING_2, TIMING_1, RECEIVED_0 | RECEIVED_1 | 7 * SENT_0 | ERROR};
+    const uint8_t timing[] = {TIMING_3, TIMING_2, TIMING_1, RECEIVED_0 | RECEIVED_1 | ALL_SENT | ERROR};
     write(CNF3, timing, sizeof timing);
     write(RXB0CTRL, (const uint8_t[]){RECEIVE_ROLLOVER}, 1);
     write(CANCTRL, (const uint8_t[]){MODE_NORMAL}, 1);

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Chooses the board that the tests run against: BOARD=emulated (the default).
-import os
+# Chooses the board that the tests run against: BOARD=emulated (the default), can:emulated, can:IFACE.
 import shutil
 
 import pytest
@@ -8,10 +7,12 @@ import pytest
 from ols_board import board
 
 
+EMULATED = ("emulated", "can:emulated")
+
+
 def pytest_configure():
-    kind = os.environ.get("BOARD", "emulated")
-    if kind != "emulated":
-        raise pytest.UsageError(f"BOARD={kind}: only `emulated` is there")
+    if board.BOARD not in EMULATED and not board.BOARD.startswith("can:"):
+        raise pytest.UsageError(f"BOARD={board.BOARD}: write emulated, can:emulated or can:IFACE")
     if not board.IMAGE.exists():
         raise pytest.UsageError(f"{board.IMAGE}: no firmware image; build it with `make firmware`")
     if not (board.EMULATOR.parent / "node_modules").exists():
@@ -26,6 +27,10 @@ def emulated():
     started = []
 
     def start(*arguments, **options):
+        if board.BOARD not in EMULATED:
+            if arguments or options:
+                pytest.skip("a real board has no injections and no traces")
+            return board.RealBoard()
         started.append(board.EmulatedBoard(*arguments, **options))
         return started[-1]
 
