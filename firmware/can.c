@@ -39,6 +39,7 @@ void can_init(void) {
     taken_bytes = 0;
     host_heard = false;
     parts_to_tell = 0;
+    state_due_us = health_due_us = 0;
     there = can_bus_init(BOARD_CAN_NUMBER);
 }
 
