@@ -59,8 +59,8 @@ lint-fast: setup
 format: setup ## clang-format in place
 	@git ls-files '*.cpp' '*.hpp' '*.c' '*.h' | xargs clang-format -i
 
-flash: firmware ## copy stage.uf2 to a board in BOOTSEL mode
-	@tools/setup/flash.sh build/firmware/stage.uf2
+flash: all ## write the image to the board on USB (BOARD=pico or feather_can, the board's firmware)
+	@$(HOST)/bin/stagectl flash build/firmware/$(or $(BOARD),pico)/stage.uf2
 
 install: host ## install the programs (DESTDIR, PREFIX)
 	@cmake --install $(HOST) --prefix $(or $(PREFIX),/usr/local)

@@ -59,6 +59,9 @@ bool board_was_reset_by_watchdog(void);
 // Resets the processor now.
 _Noreturn void board_reset(void);
 
+// Ends this firmware, dark, and starts the boot ROM's USB boot loader, which takes a new image.
+_Noreturn void board_enter_bootloader(void);
+
 // Three words that survive a watchdog reset, not a power-up.
 void board_remember(const uint32_t words[3]);
 void board_recall(uint32_t words[3]);

@@ -123,7 +123,7 @@ size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* ans
     board.incoming = bytes;
     board.incoming_bytes = byte_count;
     board.answer_bytes = 0;
-    while (turn_main_loop() || board.incoming_bytes > 0) {
+    while ((turn_main_loop() || board.incoming_bytes > 0) && !link_is_leaving()) {
     }
     const size_t answer_bytes = board.answer_bytes < answer_bytes_max ? board.answer_bytes : answer_bytes_max;
     memcpy(answer, board.answer, answer_bytes);

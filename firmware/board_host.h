@@ -24,7 +24,7 @@ void board_host_run_us(uint64_t us);
 void board_host_attach(void);
 void board_host_detach(void);
 
-// Bytes to the board, and its answers; the main loop turns until all are taken. Returns the bytes written to `answer`.
+// Bytes to the board, and its answers; the main loop turns until all are taken, or the firmware is to end. Returns the bytes written to `answer`.
 size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* answer, size_t answer_bytes_max);
 
 // Hardware trouble, from now on.

@@ -184,6 +184,16 @@ _Noreturn void board_reset(void) {
     }
 }
 
+_Noreturn void board_enter_bootloader(void) {
+    board_dark();
+    WATCHDOG_SCRATCH(3) =
+        0;  // the boot ROM restarts by watchdog, now and after flashing: no fault of the next firmware
+    const rom_lookup_function lookup = (rom_lookup_function)(uint32_t)ROM_LOOKUP;
+    const rom_usb_boot_function usb_boot = (rom_usb_boot_function)lookup(ROM_FUNCTION_TABLE, ROM_CODE('U', 'B'));
+    usb_boot(0, 0);  // no activity lamp: every pin stays as it is in reset; both of its interfaces
+    board_reset();   // where a boot ROM does not know the function
+}
+
 void board_remember(const uint32_t words[3]) {
     for (int i = 0; i < 3; i++) WATCHDOG_SCRATCH(i) = words[i];
 }

@@ -47,6 +47,10 @@ bool can_is_there(void) {
     return there;
 }
 
+bool can_is_idle(void) {
+    return !there || !can_bus_is_answered() || (can_bus_is_idle() && !isotp_is_sending(&isotp));
+}
+
 static void take_frames(uint64_t now_us) {
     for (struct can_bus_frame frame; can_bus_receive(&frame);) {
         if (frame.id != OLS_CANBUS_TO_BOARD + OF_THIS_BOARD) continue;

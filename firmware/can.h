@@ -17,6 +17,9 @@ void can_init(void);
 // Once each turn of the main loop: takes frames from the bus and puts frames on it.
 void can_poll(void);
 
+// True when nothing waits to be put on the bus, or nobody is there to take it.
+bool can_is_idle(void);
+
 // True when a controller was found.
 bool can_is_there(void);
 

@@ -37,6 +37,9 @@ bool can_bus_receive(struct can_bus_frame* frame);
 bool can_bus_send(const struct can_bus_frame* frame);
 bool can_bus_has_room(void);
 
+// True when all frames queued are on the bus, or given up.
+bool can_bus_is_idle(void);
+
 // Gives up frames that the bus has not taken for a second, which are counted. Once each turn of the main loop.
 void can_bus_poll(uint64_t now_us);
 

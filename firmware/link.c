@@ -149,6 +149,11 @@ static void answer_clear_fault(const struct ols_frame* request, struct reply* re
     reply->ok = stage_clear_fault(&reply->payload.error);
 }
 
+static void answer_reboot_to_bootloader(const struct ols_frame* request, struct reply* reply) {
+    (void)request;
+    reply->ok = stage_leave(&reply->payload.error);
+}
+
 // What only the host that armed may do, while the board is armed or plays.
 enum { ANYBODYS, OWNERS };
 
@@ -171,6 +176,7 @@ static const struct command {
     {OLS_CLEAR_FAULT, 0, 0, ANYBODYS, answer_clear_fault},
     {OLS_SWAP, 0, 0, OWNERS, answer_swap},
     {OLS_READ_DIGESTS, sizeof(struct ols_read_digests), sizeof(struct ols_read_digests), ANYBODYS, answer_read_digests},
+    {OLS_REBOOT_TO_BOOTLOADER, 0, 0, ANYBODYS, answer_reboot_to_bootloader},
 };
 
 static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
@@ -231,7 +237,7 @@ static void poll_link(int n) {
     static struct ols_frame request;  // of the link that is asking
     if (links[n].session != transports[n]->session()) begin_session(n);
     if (asking != NO_LINK && asking != n) return;
-    while (transports[n]->can_send()) {
+    while (!stage_is_leaving() && transports[n]->can_send()) {
         if (asking == n || ols_frame_parser_read(&links[n].parser, &request)) {
             if (asking != n) stage_begin_request(owner == n);
             asking = handle(n, &request) ? NO_LINK : n;
@@ -249,4 +255,10 @@ bool link_poll(void) {
 
 bool link_host_is_there(void) {
     return owner == NO_LINK || transports[owner]->is_attached();
+}
+
+bool link_is_leaving(void) {
+    for (int n = 0; n < LINKS; n++)
+        if (transports[n]->is_attached() && !transports[n]->can_send()) return false;
+    return stage_is_leaving() && can_is_idle();
 }

@@ -12,4 +12,7 @@ bool link_poll(void);
 // False when the host that armed has gone: its bus is dead.
 bool link_host_is_there(void);
 
+// True once the host has the answer to its OLS_REBOOT_TO_BOOTLOADER, or has gone: the firmware is to end.
+bool link_is_leaving(void);
+
 #endif

@@ -23,5 +23,6 @@ int main(void) {
         can_poll();
         stage_poll(link_host_is_there());
         if (!link_poll()) board_sleep();
+        if (link_is_leaving()) board_enter_bootloader();
     }
 }

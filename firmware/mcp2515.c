@@ -70,7 +70,7 @@ _Static_assert((int)TO_SEND_MAX == (int)CAN_BUS_RECEIVED_MAX && 256 % CAN_BUS_RE
 
 static struct ring received, to_send;
 static bool present;
-static uint8_t free_buffers = (1 << SEND_BUFFERS) - 1;  // bit n: send buffer n is empty
+static volatile uint8_t free_buffers = (1 << SEND_BUFFERS) - 1;  // bit n: send buffer n is empty
 static uint8_t next_buffer = SEND_BUFFERS - 1;
 static volatile bool give_up;
 static volatile uint8_t frames_sent;
@@ -313,9 +313,12 @@ bool can_bus_send(const struct can_bus_frame* frame) {
     return true;
 }
 
+bool can_bus_is_idle(void) {
+    return is_empty(&to_send) && free_buffers == (1 << SEND_BUFFERS) - 1;
+}
+
 void can_bus_poll(uint64_t now_us) {
-    const bool idle = is_empty(&to_send) && free_buffers == (1 << SEND_BUFFERS) - 1;
-    if (idle || frames_sent != progress_sent || give_up) {
+    if (can_bus_is_idle() || frames_sent != progress_sent || give_up) {
         progress_sent = frames_sent;
         progress_us = now_us;
     } else if (now_us - progress_us > GIVE_UP_US) {

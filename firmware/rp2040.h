@@ -27,6 +27,13 @@ enum {
     RESET_USBCTRL = 1 << 24
 };
 
+// Boot ROM: functions by two letters, found with a function of its own (2.8.3)
+#define ROM_FUNCTION_TABLE (*(volatile uint16_t*)0x14)
+#define ROM_LOOKUP (*(volatile uint16_t*)0x18)
+#define ROM_CODE(first, second) ((uint32_t)(first) | (uint32_t)(second) << 8)
+typedef uint32_t (*rom_lookup_function)(uint32_t table, uint32_t code);
+typedef void (*rom_usb_boot_function)(uint32_t activity_pin_mask, uint32_t disable_interface_mask);  // 2.8.3.1.6
+
 // Power-on state machine: what a watchdog reset resets (2.13.5)
 #define PSM_WDSEL REGISTER(0x40010008)
 enum { PSM_ALL_BUT_OSCILLATORS = 0x1fffc };

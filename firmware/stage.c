@@ -36,6 +36,7 @@ static bool at_edge;              // GENLOCK starts, not the command alone
 static uint32_t heartbeat_ticks;  // 0: the host may be silent
 static uint64_t heard_us;         // when the host's last request came
 static uint8_t programs_swapped;  // since start
+static bool leaving;              // for the boot loader
 
 static bool refuse(struct ols_error_reply* error, enum ols_error_code code, const char* reason) {
     error->code = (uint16_t)code;
@@ -110,6 +111,7 @@ static void end_in_fault(enum ols_fault cause, uint64_t ticks) {
 }
 
 void stage_init(void) {
+    leaving = false;
     forget_programs();
     trigger_log_begin(current);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;
@@ -363,6 +365,15 @@ bool stage_clear_fault(struct ols_error_reply* error) {
     fault_clear();
     forget_programs();
     return true;
+}
+
+bool stage_leave(struct ols_error_reply* error) {
+    leaving = state != OLS_STATE_ARMED && state != OLS_STATE_WAITING && state != OLS_STATE_PLAYING;
+    return leaving || refuse(error, OLS_ERROR_BAD_STATE, "a program is armed or playing: stop it before flashing");
+}
+
+bool stage_is_leaving(void) {
+    return leaving;
 }
 
 static uint32_t cycles_played(void) {

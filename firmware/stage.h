@@ -34,6 +34,10 @@ bool stage_stop(struct ols_error_reply* error);
 enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_reply* error);
 bool stage_clear_fault(struct ols_error_reply* error);
 
+// The firmware is to end, to be flashed: not while armed, waiting or playing. A fault is no obstacle. No command follows.
+bool stage_leave(struct ols_error_reply* error);
+bool stage_is_leaving(void);
+
 void stage_status(struct ols_status_reply* status);
 
 // The gist of the status, for everybody on the bus.

@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "board.h"
 #include "rp2040.h"
 
 enum { ENDPOINT_OUT = 1, ENDPOINT_IN = 2, PACKET_BYTES = TRANSPORT_PACKET_BYTES };
@@ -37,7 +38,7 @@ struct setup {
 
 // USB 2.0 9.6. Vendor and product are pid.codes' pair for development; a product needs its own.
 static const uint8_t device_descriptor[] = {
-    18, DESCRIPTOR_DEVICE, 0x00, 0x02, 0xff, 0, 0, PACKET_BYTES, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 0, 1};
+    18, DESCRIPTOR_DEVICE, 0x00, 0x02, 0xff, 0, 0, PACKET_BYTES, 0x09, 0x12, 0x01, 0x00, 0x00, 0x01, 1, 2, 3, 1};
 static const uint8_t configuration_descriptor[] = {
     9,
     DESCRIPTOR_CONFIGURATION,
@@ -73,7 +74,8 @@ static const uint8_t configuration_descriptor[] = {
     0,  // bulk IN
 };
 static const uint8_t language_descriptor[] = {4, DESCRIPTOR_STRING, 0x09, 0x04};
-static const char* const strings[] = {"open light stage", "light stage sequencer"};
+static char serial_number[2 * 8 + 1];  // the flash chip's unique number, in hex
+static const char* const strings[] = {"open light stage", "light stage sequencer", serial_number};
 
 static bool configured;
 static uint32_t attachments;
@@ -202,7 +204,15 @@ static void handle_setup(void) {
     }
 }
 
+static void write_serial_number(void) {
+    uint8_t id[8];
+    board_read_id(id);
+    for (size_t i = 0; i < 2 * sizeof id; i++)
+        serial_number[i] = "0123456789abcdef"[id[i / 2] >> (i % 2 ? 0 : 4) & 0xf];
+}
+
 void usb_init(void) {
+    write_serial_number();
     for (uint32_t offset = 0; offset < BUFFER_EP0; offset += 4) REGISTER(USB_MEMORY + offset) = 0;
     USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
     USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE;  // the board is powered by the bus it talks to

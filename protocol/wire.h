@@ -43,19 +43,20 @@ struct ols_frame_header {
 
 // Requests. Without a struct below, a request or reply has no payload.
 enum ols_message {
-    OLS_HELLO = 0x01,             // -> ols_hello_reply, in any state
-    OLS_LOAD_BEGIN = 0x02,        // ols_load_begin; not while armed; while playing, the next program is loaded
-    OLS_LOAD_CHUNK = 0x03,        // ols_load_chunk and data; chunks in order, without gaps
-    OLS_LOAD_END = 0x04,          // checks CRC and program -> state loaded, or next ready
-    OLS_ARM = 0x05,               // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
-    OLS_START = 0x06,             // armed -> playing, or waiting for the edge on GENLOCK that starts
-    OLS_STOP = 0x07,              // armed, playing or done -> loaded, dark at once
-    OLS_STATUS = 0x08,            // -> ols_status_reply, in any state
-    OLS_READ_TRIGGER_LOG = 0x09,  // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
-    OLS_CLEAR_FAULT = 0x0a,       // fault -> idle; the program must be loaded again
-    OLS_SWAP = 0x0b,              // playing with a next program ready -> ols_swap_reply; goes on with that
-    OLS_READ_DIGESTS = 0x0c,      // ols_read_digests -> ols_digests_reply and digests, in any state
-    OLS_ERROR = 0x7f              // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
+    OLS_HELLO = 0x01,                 // -> ols_hello_reply, in any state
+    OLS_LOAD_BEGIN = 0x02,            // ols_load_begin; not while armed; while playing, the next program is loaded
+    OLS_LOAD_CHUNK = 0x03,            // ols_load_chunk and data; chunks in order, without gaps
+    OLS_LOAD_END = 0x04,              // checks CRC and program -> state loaded, or next ready
+    OLS_ARM = 0x05,                   // ols_arm; loaded or done -> armed: first pattern shifted, everything ready
+    OLS_START = 0x06,                 // armed -> playing, or waiting for the edge on GENLOCK that starts
+    OLS_STOP = 0x07,                  // armed, playing or done -> loaded, dark at once
+    OLS_STATUS = 0x08,                // -> ols_status_reply, in any state
+    OLS_READ_TRIGGER_LOG = 0x09,      // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
+    OLS_CLEAR_FAULT = 0x0a,           // fault -> idle; the program must be loaded again
+    OLS_SWAP = 0x0b,                  // playing with a next program ready -> ols_swap_reply; goes on with that
+    OLS_READ_DIGESTS = 0x0c,          // ols_read_digests -> ols_digests_reply and digests, in any state
+    OLS_REBOOT_TO_BOOTLOADER = 0x0d,  // not while armed or playing; the board leaves after the reply, to be flashed
+    OLS_ERROR = 0x7f                  // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
 };
 
 // The first eight bytes of both structs never change, whatever else does, so that any two versions can compare hashes.

@@ -89,21 +89,34 @@ Board::Board(std::unique_ptr<Transfer> transfer)
     : transfer_(std::move(transfer)), parser_(std::make_unique<ols_frame_parser>()) {}
 
 Result<Board> Board::connect(std::unique_ptr<Transfer> transfer) {
+    auto board = connect_any_layout(std::move(transfer));
+    if (board.ok() && !board->same_layout())
+        return fail(
+            fmt::format("the board speaks message layout {:016x} and this program {:016x}: flash the firmware "
+                        "of this release: make flash",
+                        board->layout_hash(), uint64_t(OLS_LAYOUT_HASH)));
+    return board;
+}
+
+Result<Board> Board::connect_any_layout(std::unique_ptr<Transfer> transfer) {
     Board board(std::move(transfer));
     const ols_hello hello{OLS_LAYOUT_HASH};
     const auto payload = board.request(OLS_HELLO, bytes_of(hello));
     if (!payload.ok()) return payload.error();
     // The hash comes first in every version of the reply, so it is compared before the length.
-    uint64_t layout_hash = 0;
-    std::memcpy(&layout_hash, payload->data(), std::min(payload->size(), sizeof layout_hash));
-    if (layout_hash != OLS_LAYOUT_HASH || payload->size() != sizeof board.info_)
-        return fail(
-            fmt::format("the board speaks message layout {:016x} and this program {:016x}: flash the firmware "
-                        "of this release: make flash",
-                        layout_hash, uint64_t(OLS_LAYOUT_HASH)));
+    std::memcpy(&board.info_.layout_hash, payload->data(), std::min(payload->size(), sizeof board.info_.layout_hash));
+    if (payload->size() != sizeof board.info_) {
+        if (board.same_layout()) return wrong_reply();
+        return board;
+    }
     std::memcpy(&board.info_, payload->data(), sizeof board.info_);
     board.info_.firmware_version[sizeof board.info_.firmware_version - 1] = 0;
+    board.info_.board[sizeof board.info_.board - 1] = 0;
     return board;
+}
+
+bool Board::same_layout() const {
+    return info_.layout_hash == OLS_LAYOUT_HASH;
 }
 
 std::string Board::id() const {
@@ -191,6 +204,10 @@ Status Board::stop() {
 
 Status Board::clear_fault() {
     return command(OLS_CLEAR_FAULT);
+}
+
+Status Board::reboot_to_bootloader() {
+    return command(OLS_REBOOT_TO_BOOTLOADER);
 }
 
 Result<ols_status_reply> Board::status() {

@@ -33,6 +33,12 @@ class Board {
     // Says hello. A board of another message layout is refused: the error says to flash this release's firmware.
     static Result<Board> connect(std::unique_ptr<Transfer> transfer);
 
+    // For flashing: a board of any layout is good enough. Only reboot_to_bootloader and layout_hash may be used of one
+    // whose layout is another.
+    static Result<Board> connect_any_layout(std::unique_ptr<Transfer> transfer);
+    uint64_t layout_hash() const { return info_.layout_hash; }
+    bool same_layout() const;
+
     const ols_hello_reply& info() const { return info_; }
     std::string id() const;  // the flash chip's unique number, in hex
 
@@ -43,6 +49,7 @@ class Board {
     Status stop();
     Status clear_fault();
     Result<ols_status_reply> status();
+    Status reboot_to_bootloader();  // the board leaves; refused while a program is armed or plays
 
     // The log from `first_counter` on, as much of it as one message holds.
     Result<TriggerLog> read_trigger_log(uint32_t first_counter);

@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "device/can_transfer.hpp"
 #include "device/transfer.hpp"
 
 namespace ols {
@@ -120,7 +119,9 @@ class SocketTransfer : public Transfer {
     uint32_t tag_ = 0;
 };
 
-Result<std::unique_ptr<Transfer>> open_socket(const std::string& path) {
+}  // namespace
+
+Result<std::unique_ptr<Transfer>> open_socket_transfer(const std::string& path) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     if (path.empty() || path.size() >= sizeof address.sun_path)
@@ -135,15 +136,6 @@ Result<std::unique_ptr<Transfer>> open_socket(const std::string& path) {
             fmt::format("cannot reach the board at '{}': {}; start the stage first", path, std::strerror(error)));
     }
     return std::unique_ptr<Transfer>(std::make_unique<SocketTransfer>(fd, path));
-}
-
-}  // namespace
-
-Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link) {
-    constexpr std::string_view socket_scheme = "socket:";
-    if (link.starts_with(socket_scheme)) return open_socket(link.substr(socket_scheme.size()));
-    if (link.starts_with("can:") || link.starts_with("can-socket:")) return open_can(link);
-    return fail("'" + link + "' is no board link: write socket:PATH, can:IFACE or can-socket:PATH");
 }
 
 }  // namespace ols

@@ -25,9 +25,12 @@ class Transfer {
     virtual Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) = 0;
 };
 
-// "socket:PATH" is the emulated board's USB (docs/architecture.md, "USB transfers over a socket"), "can:IFACE" a SocketCAN
-// interface, "can-socket:PATH" the emulated CAN bus; "#N" behind a CAN link means board N instead of 0. The error says what
-// links there are, or to start the stage first when nobody listens.
+// "usb:" is the one board that is plugged in, "usb:SERIAL" the one of that serial number, "socket:PATH" the emulated
+// board's USB, "can:IFACE" a SocketCAN interface, "can-socket:PATH" the emulated CAN bus ("#N" behind these two: board N,
+// not 0). Errors say what links there are, which boards are plugged in, or how to get permission.
 Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link);
+
+// The emulated board's USB over the AF_UNIX socket at `path` (docs/architecture.md, "USB transfers over a socket").
+Result<std::unique_ptr<Transfer>> open_socket_transfer(const std::string& path);
 
 }  // namespace ols

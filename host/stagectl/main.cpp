@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
     ols::add_sequence_verb(app, exit_code);
     ols::add_calibrate_verb(app, exit_code);
     ols::add_ingest_verb(app, exit_code);
+    ols::add_flash_verb(app, exit_code);
     CLI11_PARSE(app, argc, argv);
     return exit_code;
 }

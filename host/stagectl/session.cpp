@@ -23,7 +23,8 @@ void request_stop(int signal_number) {
 
 void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
     verb.add_option("--stage", stage_path, "stage.toml; without it, the default stage");
-    verb.add_option("--board", board, "the board, socket:PATH; otherwise stage.toml's [board] link");
+    verb.add_option("--board", board,
+                    "the board, usb:, usb:SERIAL or socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera) verb.add_option("--camera", camera, "the camera, ring:PATH; otherwise stage.toml's camera source");
 }
 

@@ -51,7 +51,7 @@ Result<int> run(const Options& options) {
 void add_status_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<Options>();
     CLI::App* verb = app.add_subcommand("status", "ask the board how it is");
-    verb->footer("Example: stagectl status --board socket:run/board.sock");
+    verb->footer("Example: stagectl status --board usb:");
     options->links.add_to(*verb, false);
     verb->add_flag("--clear-fault", options->clear_fault, "end a latched fault, once its cause is gone");
     verb->add_flag("--json", options->json, "print as JSON");

@@ -12,5 +12,6 @@ void add_status_verb(CLI::App& app, int& exit_code);
 void add_sequence_verb(CLI::App& app, int& exit_code);
 void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_ingest_verb(CLI::App& app, int& exit_code);
+void add_flash_verb(CLI::App& app, int& exit_code);
 
 }  // namespace ols

@@ -54,6 +54,7 @@ MESSAGES = {
     'clear_fault': (0x0a, b''),
     'swap': (0x0b, b''),
     'swap_reply': (0x0b | REPLY, struct.pack('<IB3x', 1234, 2)),
+    'reboot_to_bootloader': (0x0d, b''),
     'error_reply': (0x7f | REPLY, struct.pack('<HH116s', 6, 7, fixed('slot 7: trigger mask 16: 15 at most', 116))),
 }
 

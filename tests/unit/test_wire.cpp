@@ -65,6 +65,7 @@ TEST(Wire, messages_without_payload) {
     expect_golden("stop", OLS_STOP, {});
     expect_golden("status", OLS_STATUS, {});
     expect_golden("clear_fault", OLS_CLEAR_FAULT, {});
+    expect_golden("reboot_to_bootloader", OLS_REBOOT_TO_BOOTLOADER, {});
     expect_golden("swap", OLS_SWAP, {});
 }
 

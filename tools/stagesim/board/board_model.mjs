@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
+import { startsUsbBoot } from './boot_rom.mjs';
 import { CanBoard } from './can_board.mjs';
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
+
+const WATCHDOG_SCRATCH4 = 0x4005801c;
 
 export class Board {
   #image;
@@ -134,6 +137,13 @@ export class Board {
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
+    if (startsUsbBoot(scratch)) {
+      // Cleared by the boot ROM as it jumps. The loader's own USB device is not modelled: nobody answers.
+      this.chip.writeUint32(WATCHDOG_SCRATCH4, 0);
+      this.hang();
+      this.#options.log('in the USB boot loader, which is not emulated; a reset starts the image again');
+      return;
+    }
     boot(this.chip, this.#image);
   }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // One RP2040 from a reset to the next: rp2040js with the parts that time or the program would notice put right.
 import { RP2040 } from 'rp2040js';
+import { attachBootRom } from './boot_rom.mjs';
 import { correctDma } from './dma.mjs';
 import { attachFlash } from './flash.mjs';
 import { Lockstep } from './lockstep.mjs';
@@ -34,6 +35,7 @@ export function buildChip({ naive = false, start, logger }) {
   correctDma(chip);
   correctSystem(chip, start);
   attachFlash(chip, start.uniqueId);
+  attachBootRom(chip);
   pads.attach(chip);
   return { chip, pads, time, lockstep: new Lockstep(chip, pads, time, naive) };
 }
