@@ -57,7 +57,10 @@ async function main() {
   usb?.close();
   vcd?.close(board.tick);
   await stage?.end();
-  if (options.stats) process.stderr.write(`${JSON.stringify({ ...pacer.statistics, dropped: stage?.dropped ?? 0 })}\n`);
+  if (options.stats) {
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0 };
+    process.stderr.write(`${JSON.stringify(statistics)}\n`);
+  }
 }
 
 main().catch((error) => {
