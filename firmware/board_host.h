@@ -33,6 +33,9 @@ void board_host_starve_shifter(void);
 void board_host_delay_triggers(uint32_t ticks);
 void board_host_corrupt_program(void);
 
+// A light of so many ticks at LIGHT_EN's pad, whatever the program says.
+void board_host_hold_light(uint32_t ticks);
+
 // A rise of GENLOCK.
 void board_host_genlock(void);
 

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: MIT
-// What start-up needs of the RP2040 board beyond board.h.
+// What the RP2040's handlers need of the board beyond board.h.
 #ifndef OLS_BOARD_RP2040_H
 #define OLS_BOARD_RP2040_H
 
 #include <stdint.h>
 
-// Handler of every interrupt in use. An interrupt only wakes: it masks itself, the main loop does the work, and
-// board_sleep unmasks.
-void board_wake_interrupt(void);
+// Alarms of the timer, and so who uses each.
+enum { BOARD_ALARM_TICK = 0, BOARD_ALARM_HEARTBEAT = 1, BOARD_ALARM_TRIGGER = 2 };
 
-// Of inputs: the CAN controller's raises IRQ_CAN, the others wake.
-void board_gpio_interrupt(void);
-
-// No sleep before the main loop's next turn.
+// From a handler: the main loop has something to look at. board_sleep returns at once.
 void board_wake(void);
 
 // Holds and then releases the reset of peripherals (RESET_ bits).

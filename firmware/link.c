@@ -24,11 +24,11 @@ struct link {
     uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
 };
 
-enum { LINKS = 2, NO_LINK = -1 };
-static const struct transport* const transports[LINKS] = {&usb_transport, &can_transport};
+enum { USB_LINK, CAN_LINK, LINKS, NO_LINK = -1 };
+static const struct transport* const transports[LINKS] = {[USB_LINK] = &usb_transport, [CAN_LINK] = &can_transport};
 static struct link links[LINKS];
 static int asking = NO_LINK;  // whose request takes several turns: the others wait
-static int owner = NO_LINK;   // who armed last
+static volatile int owner = NO_LINK;  // who armed last
 
 // A reply being made; without `ok` it is the error. `busy`: the request takes another turn of the main loop.
 struct reply {
@@ -251,6 +251,10 @@ static void poll_link(int n) {
 bool link_poll(void) {
     for (int n = 0; n < LINKS; n++) poll_link(n);
     return asking != NO_LINK;
+}
+
+bool link_usb_has_armed(void) {
+    return owner == USB_LINK;
 }
 
 bool link_host_is_there(void) {

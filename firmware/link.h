@@ -9,6 +9,9 @@
 // is not to wait for anything before the next turn: a long request is being worked on.
 bool link_poll(void);
 
+// True when the host on USB armed last, so that its loss matters; from any handler.
+bool link_usb_has_armed(void);
+
 // False when the host that armed has gone: its bus is dead.
 bool link_host_is_there(void);
 

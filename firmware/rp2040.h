@@ -81,7 +81,8 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 #define WATCHDOG_TRIGGER (1u << 31)
 
 // Timer, microseconds (4.6.5)
-#define TIMER_ALARM0 REGISTER(0x40054010)
+#define TIMER_ALARM(n) REGISTER(0x40054010 + 4 * (n))
+#define TIMER_ARMED REGISTER(0x40054020)  // write an alarm's bit to disarm it
 #define TIMER_RAW_HIGH REGISTER(0x40054024)
 #define TIMER_RAW_LOW REGISTER(0x40054028)
 #define TIMER_INTR REGISTER(0x40054034)
@@ -153,7 +154,8 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SM_ADDR(base, machine) REGISTER((base) + 0x0d4 + 0x18 * (machine))
 #define PIO_SM_INSTR(base, machine) REGISTER((base) + 0x0d8 + 0x18 * (machine))
 #define PIO_SM_PINCTRL(base, machine) REGISTER((base) + 0x0dc + 0x18 * (machine))
-#define PIO_IRQ0_INTE(base) REGISTER((base) + 0x12c)
+#define PIO_IRQ0_INTE(base) ((base) + 0x12c)
+#define PIO_IRQ1_INTE(base) ((base) + 0x138)
 #define PIO_CTRL_ENABLE(machine) (1u << (machine))
 #define PIO_CTRL_RESTART(machine) (0x11u << (4 + (machine)))  // the machine and its clock divider
 #define PIO_INTE_FLAG(flag) (1u << (8 + (flag)))
@@ -214,7 +216,8 @@ enum {
 #define USB_EP_STALL_ARM REGISTER(0x50110068)
 #define USB_MUXING REGISTER(0x50110074)
 #define USB_PWR REGISTER(0x50110078)
-#define USB_INTE REGISTER(0x50110090)
+#define USB_INTE 0x50110090
+#define USB_INTS REGISTER(0x50110098)
 #define USB_ENDPOINT_CONTROL_IN(endpoint) REGISTER(USB_MEMORY + 8 * (endpoint))
 #define USB_ENDPOINT_CONTROL_OUT(endpoint) REGISTER(USB_MEMORY + 4 + 8 * (endpoint))
 #define USB_BUFFER_CONTROL_IN(endpoint) REGISTER(USB_MEMORY + 0x80 + 8 * (endpoint))
@@ -225,6 +228,7 @@ enum {
     USB_SIE_EP0_INT_1BUF = 1 << 29,
     USB_SIE_BUS_RESET = 1 << 19,
     USB_SIE_SETUP_REC = 1 << 17,
+    USB_SIE_RESUME = 1 << 11,
     USB_SIE_SUSPENDED = 1 << 4,
     USB_MUXING_TO_PHY = 1 << 0,
     USB_MUXING_SOFTCON = 1 << 3,
@@ -232,6 +236,7 @@ enum {
     USB_PWR_VBUS_DETECT_OVERRIDE = 1 << 3,
     USB_INT_BUFF_STATUS = 1 << 4,
     USB_INT_BUS_RESET = 1 << 12,
+    USB_INT_SUSPEND = 1 << 14,
     USB_INT_SETUP_REQ = 1 << 16,
     USB_ENDPOINT_INTERRUPT = 1 << 29,
     USB_ENDPOINT_BULK = 2 << 26,
@@ -243,9 +248,13 @@ enum {
     USB_BUFFER_BYTES = 0x3ff
 };
 
+// Single-cycle IO: the divider, done 8 cycles after the divisor is written (2.3.1.5)
+#define SIO_DIV_UDIVIDEND REGISTER(0xd0000060)
+#define SIO_DIV_UDIVISOR REGISTER(0xd0000064)
+#define SIO_DIV_QUOTIENT REGISTER(0xd0000070)
+
 // Cortex-M0+ (2.4.8)
 #define NVIC_ISER REGISTER(0xe000e100)
-#define NVIC_ICER REGISTER(0xe000e180)
 #define NVIC_ISPR REGISTER(0xe000e200)
 // Two bits each, highest in a byte: 0 interrupts 1, and so on
 #define NVIC_IPR(interrupt) REGISTER(0xe000e400 + (interrupt) / 4 * 4)
@@ -253,6 +262,17 @@ enum {
 #define SCB_VTOR REGISTER(0xe000ed08)
 
 // Interrupts (2.3.2). Nothing but software raises 26 to 31.
-enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_GPIO = 13, IRQ_CAN = 26, IRQ_COUNT = 27 };
+enum {
+    IRQ_TIMER_0 = 0,
+    IRQ_TIMER_1 = 1,
+    IRQ_TIMER_2 = 2,
+    IRQ_USBCTRL = 5,
+    IRQ_PIO0_0 = 7,
+    IRQ_PIO1_0 = 9,
+    IRQ_PIO1_1 = 10,
+    IRQ_GPIO = 13,
+    IRQ_CAN = 26,
+    IRQ_COUNT = 27
+};
 
 #endif

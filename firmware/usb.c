@@ -17,6 +17,9 @@ enum {
     DONE_IN = 1 << 2 * ENDPOINT_IN
 };
 
+// The handler masks what has come up; usb_poll deals with it.
+enum { INTERRUPTS = USB_INT_BUFF_STATUS | USB_INT_BUS_RESET | USB_INT_SUSPEND | USB_INT_SETUP_REQ };
+
 // Requests of USB 2.0 9.4, as bRequest << 8 | bmRequestType.
 enum {
     GET_STATUS_DEVICE = 0x0080,
@@ -77,7 +80,7 @@ static const uint8_t language_descriptor[] = {4, DESCRIPTOR_STRING, 0x09, 0x04};
 static char serial_number[2 * 8 + 1];  // the flash chip's unique number, in hex
 static const char* const strings[] = {"open light stage", "light stage sequencer", serial_number};
 
-static bool configured;
+static bool configured, suspended;
 static uint32_t attachments;
 static uint8_t new_address;  // not zero: takes effect when the status stage is over
 static bool out_toggle, in_toggle;
@@ -217,7 +220,7 @@ void usb_init(void) {
     USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
     USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE;  // the board is powered by the bus it talks to
     REGISTER(USB_SIE_CTRL) = USB_SIE_EP0_INT_1BUF;
-    USB_INTE = USB_INT_BUFF_STATUS | USB_INT_BUS_RESET | USB_INT_SETUP_REQ;
+    REGISTER(USB_INTE) = INTERRUPTS;
     USB_MAIN_CTRL = 1;  // controller on, as a device
     REGISTER_SET(USB_SIE_CTRL) = USB_SIE_PULLUP;
 }
@@ -245,9 +248,13 @@ void usb_poll(void) {
     if (status & USB_SIE_BUS_RESET) {
         USB_SIE_STATUS_CLEAR = USB_SIE_BUS_RESET;
         USB_ADDR_ENDP = 0;
-        configured = false;
+        configured = suspended = false;
         new_address = 0;
         reset_endpoints();
+    }
+    if (status & (USB_SIE_SUSPENDED | USB_SIE_RESUME)) {
+        USB_SIE_STATUS_CLEAR = status & (USB_SIE_SUSPENDED | USB_SIE_RESUME);
+        suspended = !(status & USB_SIE_RESUME);
     }
     // Before setup packets: a finished SET_ADDRESS takes effect before what is asked next.
     if (USB_BUFF_STATUS) handle_done_buffers();
@@ -255,10 +262,11 @@ void usb_poll(void) {
         USB_SIE_STATUS_CLEAR = USB_SIE_SETUP_REC;
         handle_setup();
     }
+    REGISTER_SET(USB_INTE) = INTERRUPTS;
 }
 
 static bool is_attached(void) {
-    return configured && !(USB_SIE_STATUS & USB_SIE_SUSPENDED);
+    return configured && !suspended;
 }
 
 static uint32_t session(void) {

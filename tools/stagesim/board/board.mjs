@@ -68,7 +68,10 @@ async function main() {
   can?.close();
   vcd?.close(board.tick);
   await stage?.end();
-  if (options.stats) process.stderr.write(`${JSON.stringify({ ...pacer.statistics, dropped: stage?.dropped ?? 0 })}\n`);
+  if (options.stats) {
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0 };
+    process.stderr.write(`${JSON.stringify(statistics)}\n`);
+  }
 }
 
 function boardOf(image) {

@@ -5,6 +5,7 @@ import { startsUsbBoot } from './boot_rom.mjs';
 import { CanBoard } from './can_board.mjs';
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
+import { hangProgram } from './processor.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
 
@@ -66,9 +67,20 @@ export class Board {
     return this.#epoch + this.#parts.time.cycle;
   }
 
+  /** Since the chip's last reset. */
+  get cycle() {
+    return this.#parts.time.cycle;
+  }
+
   /** Cycles in which the processor was awake, since the last reset. */
   get awakeCycles() {
     return this.#parts.lockstep.awakeCycles;
+  }
+
+  /** The longest times of handlers since the last reset, in cycles: by exception number, and of the program under PRIMASK. */
+  get handlerTimes() {
+    const { handlers, longestHeld } = this.#parts.lockstep.handlerTimes;
+    return { handlers: Object.fromEntries(handlers), held: longestHeld };
   }
 
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
@@ -105,10 +117,17 @@ export class Board {
     this.#options.onReset(cause);
   }
 
-  /** The processor stops for good, as if the program had gone astray; the rest of the chip goes on. */
+  /** The main program never goes on, as if it had gone astray; handlers run, and so does the rest of the chip. */
   hang() {
-    this.chip.core.enabledInterrupts = 0;
-    this.chip.core.waiting = true;
+    const { core } = this.chip;
+    while (core.IPSR !== 0) this.#parts.lockstep.run(this.#parts.time.cycle + 1);
+    hangProgram(this.chip);
+  }
+
+  /** The processor stops for good, in a handler that never ends; the rest of the chip goes on. */
+  lockUp() {
+    hangProgram(this.chip);
+    this.chip.core.PM = true;
   }
 
   /** Drives an input of the board from outside, until it is driven otherwise. */
