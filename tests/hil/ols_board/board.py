@@ -180,6 +180,15 @@ class Link:
                 return status
         raise TimeoutError(f"the board stays in state {status['state']}")
 
+    def digests(self, first=0):
+        """The digests of cycles from number `first` on, as dictionaries, and how many are lost."""
+        names = ("first_rise_ticks", "last_rise_ticks", "first_counter", "cycle", "entries_crc32", "trigger_count",
+                 "program", "flags")
+        reply = self.ask(wire.READ_DIGESTS, first.to_bytes(4, "little") + (31).to_bytes(2, "little") + b"\0\0")
+        _, _, lost, count, _ = wire.DIGESTS_REPLY.unpack_from(reply)
+        return [dict(zip(names, wire.DIGEST.unpack_from(reply, wire.DIGESTS_REPLY.size + n * wire.DIGEST.size)))
+                for n in range(count)], lost
+
     def trigger_log(self, first=0):
         """All entries from counter `first` on that the board has now, and how many it has lost."""
         entries = []
