@@ -14,6 +14,14 @@
 // is connected to is wired to 3.3 V.
 enum board_stop_input { BOARD_EMERGENCY_STOP, BOARD_OVER_TEMPERATURE, BOARD_OPEN_LAMP, BOARD_STOP_INPUTS };
 
+// On the CAN bus: which of up to 16 boards this one is, and the bit rate, 1000 or 500.
+#ifndef BOARD_CAN_NUMBER
+#define BOARD_CAN_NUMBER 0
+#endif
+#ifndef BOARD_CAN_KBIT_S
+#define BOARD_CAN_KBIT_S 1000
+#endif
+
 #define BOARD_TICK_HZ 125000000u
 #define BOARD_TICKS_PER_US (BOARD_TICK_HZ / 1000000u)
 #define BOARD_FIRMWARE_VERSION "0.1.0"
@@ -31,11 +39,16 @@ void board_dark(void);
 // Gives the pins to PIO. Bit n of `inverted_triggers`: TRIGn is active low at the pad, for PIO it is high all the same.
 void board_connect_pins(uint8_t inverted_triggers);
 
-// Bit n: stop input n is low, or has been since the last call, however shortly.
+// Bit n: stop input n is low now. That it was, however shortly, is for its handler (interrupts.h).
 uint32_t board_stop_inputs(void);
 
-// Forgets rises of GENLOCK. They only wake: PIO starts by itself, and the processor is to notice soon.
-void board_forget_genlock(void);
+// Lets no handler run until board_release_interrupts, which wants what this returned. For some hundred instructions at
+// most: the times of docs/firmware.md, "How each doubt ends dark", reckon with it.
+uint32_t board_hold_interrupts(void);
+void board_release_interrupts(uint32_t held);
+
+// Stops with OLS_FAULT_HEARTBEAT after so many microseconds, unless it is called again before; 0: does not.
+void board_expect_message(uint32_t within_us);
 
 uint64_t board_time_us(void);
 

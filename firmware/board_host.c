@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Board on Linux: board.h, player.h, witness.h and transport.h without hardware. Time passes when the test says so, and
+// Board on Linux: board.h, player.h, witness.h and the USB of usb.h without hardware. Time passes when the test says so, and
 // triggers fire at their scheduled ticks; what PIO makes of the words is not imitated here, but tested on its own.
 #include "board_host.h"
 
@@ -7,12 +7,16 @@
 #include <string.h>
 
 #include "board.h"
+#include "can.h"
 #include "fault.h"
+#include "light_watch.h"
 #include "link.h"
 #include "player.h"
 #include "pulse.h"
+#include "schedule.h"
 #include "stage.h"
-#include "transport.h"
+#include "stop.h"
+#include "usb.h"
 #include "witness.h"
 
 enum { ANSWER_BYTES_MAX = 1 << 16 };
@@ -23,7 +27,9 @@ static struct {
     bool bitten;
     uint32_t surviving[3];
     bool pins_connected;
-    uint32_t stop_inputs, stop_edges;  // low now; have fallen since they were asked for
+    uint32_t stop_inputs;          // low now
+    uint64_t message_until_us;     // 0: no message is expected
+    uint32_t longest_light_ticks;  // that is allowed
 
     struct sequence* armed;
     const struct sequence* following;  // from cycle following_from on; null when no swap is due
@@ -56,6 +62,7 @@ static void start_firmware(void) {
     player_stop();
     fault_init();
     stage_init();
+    can_init();
 }
 
 void board_host_power_up(void) {
@@ -70,7 +77,8 @@ void board_host_bite(void) {
 }
 
 static bool turn_main_loop(void) {
-    stage_poll(transport_is_attached());
+    can_poll();
+    stage_poll(link_host_is_there());
     return link_poll();
 }
 
@@ -79,10 +87,13 @@ static void play(void) {
     while (board.playing && board.next_rise_ticks <= now_ticks()) {
         const struct sequence* const sequence = board.armed;
         const struct ols_slot* const slot = &sequence_slots(sequence)[board.next_slot];
-        if (sequence_triggers(sequence, slot) & 1) {
+        if (board.pins_connected && sequence_triggers(sequence, slot) & 1) {
             const uint64_t rise = board.next_rise_ticks + board.delay_ticks - board.start_ticks +
                                   (uint64_t)sequence_trigger_offset_ticks(sequence, slot, 0);
-            board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
+            const uint32_t stamp = ~(uint32_t)(rise / WITNESS_COUNT_TICKS);
+            board.stamps[board.stamp_count++ % WITNESS_RING_STAMPS] = stamp;
+            if (!schedule_take(stamp)) stop_now(OLS_FAULT_SLIPPED);
+            schedule_seek();
         }
         board.next_rise_ticks += slot->period_ticks;
         if (++board.next_slot < sequence->header.slot_count) continue;
@@ -103,6 +114,7 @@ void board_host_run_us(uint64_t us) {
     while (board.time_us < end_us) {
         board.time_us += end_us - board.time_us < 1000 ? end_us - board.time_us : 1000;
         play();
+        if (board.message_until_us != 0 && board.time_us >= board.message_until_us) stop_now(OLS_FAULT_HEARTBEAT);
         turn_main_loop();
     }
 }
@@ -114,6 +126,7 @@ void board_host_attach(void) {
 
 void board_host_detach(void) {
     board.attached = false;
+    if (link_usb_has_armed()) stop_now(OLS_FAULT_HOST_LOST);
 }
 
 size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* answer, size_t answer_bytes_max) {
@@ -130,12 +143,15 @@ size_t board_host_exchange(const uint8_t* bytes, size_t byte_count, uint8_t* ans
 void board_host_starve_timeline(void) {
     board.playing = false;
     board.events |= PLAYER_TIMELINE_STARVED;
+    stop_now(OLS_FAULT_TIMELINE_STARVED);
 }
 
 void board_host_starve_shifter(void) {
     board.shifter_starved = true;
-    if (board.playing) board.events |= PLAYER_SHIFTER_STARVED;
+    if (!board.playing) return;
+    board.events |= PLAYER_SHIFTER_STARVED;
     board.playing = false;
+    stop_now(OLS_FAULT_SHIFTER_STARVED);
 }
 
 void board_host_delay_triggers(uint32_t ticks) {
@@ -148,8 +164,14 @@ void board_host_corrupt_program(void) {
 
 void board_host_pull_stop_input(unsigned input, bool low) {
     board.stop_inputs &= ~(1u << input);
-    if (low) board.stop_inputs |= 1u << input;
-    board.stop_edges |= board.stop_inputs;
+    static const enum ols_fault causes[] = {OLS_FAULT_EMERGENCY_STOP, OLS_FAULT_OVER_TEMPERATURE, OLS_FAULT_OPEN_LAMP};
+    if (!low) return;
+    board.stop_inputs |= 1u << input;
+    stop_now(causes[input]);
+}
+
+void board_host_hold_light(uint32_t ticks) {
+    if (ticks > board.longest_light_ticks) stop_now(OLS_FAULT_OVER_DUTY);
 }
 
 bool board_host_pins_are_connected(void) {
@@ -168,13 +190,19 @@ void board_connect_pins(uint8_t inverted_triggers) {
 }
 
 uint32_t board_stop_inputs(void) {
-    const uint32_t low = board.stop_inputs | board.stop_edges;
-    board.stop_edges = 0;
-    return low;
+    return board.stop_inputs;
 }
 
-void board_forget_genlock(void) {
-    // Nothing sleeps here.
+uint32_t board_hold_interrupts(void) {
+    return 0;  // there are none
+}
+
+void board_release_interrupts(uint32_t held) {
+    (void)held;
+}
+
+void board_expect_message(uint32_t within_us) {
+    board.message_until_us = within_us == 0 ? 0 : board.time_us + within_us;
 }
 
 uint64_t board_time_us(void) {
@@ -211,7 +239,7 @@ bool player_arm(const struct sequence* sequence, bool at_edge) {
     board.at_edge = at_edge;
     board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
     board.events = 0;
-    board_connect_pins(0);
+    stop_connect_pins(0);
     if (!board.shifter_starved) return true;
     player_stop();
     return false;
@@ -247,6 +275,7 @@ bool player_swap(const struct sequence* following, uint32_t* after_cycles) {
     if (board.armed->header.cycles != 0 && *after_cycles > board.armed->header.cycles) return false;
     board.following = following;
     board.following_from = *after_cycles;
+    schedule_swap(following, *after_cycles);
     return true;
 }
 
@@ -282,17 +311,27 @@ uint32_t witness_stamp(uint32_t n) {
     return board.stamps[n % WITNESS_RING_STAMPS];
 }
 
-// transport.h
+// light_watch.h
 
-bool transport_is_attached(void) {
+void light_watch_arm(uint32_t longest_ticks) {
+    board.longest_light_ticks = longest_ticks;
+}
+
+void light_watch_allow(uint32_t longest_ticks) {
+    board.longest_light_ticks = longest_ticks;
+}
+
+// usb.h
+
+static bool is_attached(void) {
     return board.attached;
 }
 
-uint32_t transport_session(void) {
+static uint32_t session(void) {
     return board.session;
 }
 
-size_t transport_receive(uint8_t* bytes) {
+static size_t receive(uint8_t* bytes) {
     const size_t byte_count =
         board.incoming_bytes < TRANSPORT_PACKET_BYTES ? board.incoming_bytes : TRANSPORT_PACKET_BYTES;
     if (byte_count == 0) return 0;
@@ -302,12 +341,14 @@ size_t transport_receive(uint8_t* bytes) {
     return byte_count;
 }
 
-bool transport_can_send(void) {
+static bool can_send(void) {
     return true;
 }
 
-void transport_send(const uint8_t* bytes, size_t byte_count) {
+static void send(const uint8_t* bytes, size_t byte_count) {
     if (board.answer_bytes + byte_count > sizeof board.answer) return;  // like a host that reads no more
     memcpy(board.answer + board.answer_bytes, bytes, byte_count);
     board.answer_bytes += byte_count;
 }
+
+const struct transport usb_transport = {is_attached, session, receive, can_send, send};

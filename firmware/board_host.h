@@ -33,6 +33,9 @@ void board_host_starve_shifter(void);
 void board_host_delay_triggers(uint32_t ticks);
 void board_host_corrupt_program(void);
 
+// A light of so many ticks at LIGHT_EN's pad, whatever the program says.
+void board_host_hold_light(uint32_t ticks);
+
 // A rise of GENLOCK.
 void board_host_genlock(void);
 
@@ -41,6 +44,17 @@ void board_host_pull_stop_input(unsigned input, bool low);
 
 // True while pins belong to PIO; false is dark.
 bool board_host_pins_are_connected(void);
+
+// Fits or removes a CAN controller; before power-up.
+void board_host_fit_can(bool fitted);
+
+// A frame for the board, or one of its own; false when there is no room, or none.
+bool board_host_can_put(uint16_t id, const uint8_t* data, uint8_t length);
+bool board_host_can_take(uint16_t* id, uint8_t data[8], uint8_t* length);
+
+// Whether anybody acknowledges what the board sends; and a bus-off with its recovery.
+void board_host_can_answer(bool answered);
+void board_host_can_bus_off(void);
 
 #ifdef __cplusplus
 }

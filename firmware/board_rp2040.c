@@ -7,7 +7,6 @@
 #include "rp2040.h"
 
 enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
-#define WAKE_INTERRUPTS (1u << IRQ_TIMER_0 | 1u << IRQ_USBCTRL | 1u << IRQ_PIO0_0 | 1u << IRQ_GPIO)
 
 // In the fourth scratch register while this firmware runs: the boot ROM and debuggers reset by watchdog, too, and those
 // are no faults.
@@ -16,7 +15,7 @@ enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
 static volatile bool woken;
 static bool reset_by_watchdog;
 
-static void release_reset(uint32_t blocks) {
+void board_release_reset(uint32_t blocks) {
     REGISTER_SET(RESETS_RESET) = blocks;  // known state, also after a jump from a debugger
     REGISTER_CLEAR(RESETS_RESET) = blocks;
     while (~RESETS_RESET_DONE & blocks) {
@@ -46,7 +45,7 @@ static void init_clocks(void) {
     CLK_REF_CTRL = CLK_REF_SRC_XOSC;
     while (!(CLK_REF_SELECTED & 1 << CLK_REF_SRC_XOSC)) {
     }
-    release_reset(RESET_PLL_SYS | RESET_PLL_USB);
+    board_release_reset(RESET_PLL_SYS | RESET_PLL_USB);
     start_pll(PLL_SYS_BASE, 125, 6, 2);  // 1500 MHz / 12 = 125 MHz
     start_pll(PLL_USB_BASE, 100, 5, 5);  // 1200 MHz / 25 = 48 MHz
     REGISTER_SET(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
@@ -93,12 +92,12 @@ static void init_pins(void) {
 }
 
 void board_init(void) {
-    release_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
+    board_release_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
     init_pins();
     init_clocks();
-    release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
+    board_release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
     BUSCTRL_BUS_PRIORITY = BUS_PRIORITY_DMA;  // the processor waits rather than a FIFO
-    TIMER_INTE = 1;
+    TIMER_INTE = 1u << BOARD_ALARM_TICK | 1u << BOARD_ALARM_HEARTBEAT | 1u << BOARD_ALARM_TRIGGER;
     reset_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH(3) == RUNNING_MAGIC;
     WATCHDOG_SCRATCH(3) = RUNNING_MAGIC;
     PSM_WDSEL = PSM_ALL_BUT_OSCILLATORS;
@@ -109,16 +108,26 @@ void board_init(void) {
 uint32_t board_stop_inputs(void) {
     uint32_t low = 0;
     for (uint32_t n = 0; n < BOARD_STOP_INPUTS; n++) {
-        const uint32_t pin = BOARD_PIN_STOP_INPUTS + n;
-        const bool fell = GPIO_INTR(pin) & GPIO_EDGE_LOW(pin);
-        GPIO_INTR(pin) = GPIO_EDGE_LOW(pin);
-        if (fell || !(GPIO_STATUS(pin) & GPIO_FROM_PAD)) low |= 1u << n;
+        if (!(GPIO_STATUS(BOARD_PIN_STOP_INPUTS + n) & GPIO_FROM_PAD)) low |= 1u << n;
     }
     return low;
 }
 
-void board_forget_genlock(void) {
-    GPIO_INTR(BOARD_PIN_GENLOCK) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);
+uint32_t board_hold_interrupts(void) {
+    uint32_t held;
+    __asm volatile("mrs %0, primask\n\tcpsid i" : "=r"(held)::"memory");
+    return held;
+}
+
+void board_release_interrupts(uint32_t held) {
+    __asm volatile("msr primask, %0" ::"r"(held) : "memory");
+}
+
+void board_expect_message(uint32_t within_us) {
+    if (within_us > 0)
+        TIMER_ALARM(BOARD_ALARM_HEARTBEAT) = TIMER_RAW_LOW + within_us;
+    else
+        TIMER_ARMED = 1u << BOARD_ALARM_HEARTBEAT;
 }
 
 uint64_t board_time_us(void) {
@@ -129,15 +138,23 @@ uint64_t board_time_us(void) {
     }
 }
 
-void board_wake_interrupt(void) {
-    NVIC_ICER = WAKE_INTERRUPTS;
+void board_wake(void) {
     woken = true;
 }
 
+void board_watch_can_interrupt(void) {
+    GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_CAN_INTERRUPT)) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    NVIC_IPR(IRQ_CAN) = NVIC_PRIORITY(IRQ_CAN, 3);
+    NVIC_ISER = 1u << IRQ_CAN;
+}
+
+void board_raise_can_interrupt(void) {
+    NVIC_ISPR = 1u << IRQ_CAN;
+}
+
 void board_sleep(void) {
-    TIMER_INTR = 1;
-    TIMER_ALARM0 = TIMER_RAW_LOW + WAKE_US;
-    NVIC_ISER = WAKE_INTERRUPTS;
+    TIMER_ALARM(BOARD_ALARM_TICK) = TIMER_RAW_LOW + WAKE_US;
     __asm volatile("cpsid i" ::: "memory");
     if (!woken) __asm volatile("wfi");  // wakes on a pending interrupt although they are masked (ARMv6-M B1.5.19)
     __asm volatile("cpsie i" ::: "memory");

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The firmware's one loop. Light and triggers do not wait for it: PIO plays them (pulse.pio), and stops dark by itself.
+// The firmware's one loop. Light and triggers do not wait for it: PIO plays them (pulse.pio), and handlers end them in the
+// dark (interrupts.h).
 #include "board.h"
+#include "can.h"
 #include "fault.h"
+#include "interrupts.h"
+#include "light_watch.h"
 #include "link.h"
 #include "player.h"
 #include "stage.h"
-#include "transport.h"
 #include "usb.h"
 #include "witness.h"
 
@@ -13,13 +16,17 @@ int main(void) {
     board_init();
     player_init();
     witness_init();
+    light_watch_init();
     fault_init();
     stage_init();
     usb_init();
+    can_init();
+    interrupts_init();
     for (;;) {
         board_feed_watchdog();
         usb_poll();
-        stage_poll(transport_is_attached());
+        can_poll();
+        stage_poll(link_host_is_there());
         if (!link_poll()) board_sleep();
         if (link_is_leaving()) board_enter_bootloader();
     }

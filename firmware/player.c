@@ -8,6 +8,8 @@
 #include "cycle_feed.h"
 #include "pio.h"
 #include "pulse.h"
+#include "schedule.h"
+#include "stop.h"
 
 enum { SHIFTER_ORIGIN = TIMELINE_WORDS, GUARD_ORIGIN = SHIFTER_ORIGIN + SHIFTER_WORDS };
 enum { FLAG_SEND = 4, FLAG_SENT = 5, FLAGS_ALL = 0xff, FLAGS_FOR_PROCESSOR = 7 };
@@ -67,7 +69,6 @@ void player_init(void) {
     }
 
     player_stop();
-    PIO_IRQ0_INTE(PIO0_BASE) = PIO_INTE_FLAG(0) | PIO_INTE_FLAG(1) | PIO_INTE_FLAG(2);
 }
 
 // Gives every cycle in first..end-1 to the sequence.
@@ -114,7 +115,7 @@ bool player_arm(const struct sequence* sequence, bool at_edge) {
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
     cycle_feed_start(&timeline_feed);
     cycle_feed_start(&shifter_feed);
-    board_connect_pins(inverted_triggers(sequence));
+    stop_connect_pins(inverted_triggers(sequence));
     if (send_first_pattern()) return true;
     player_stop();
     return false;
@@ -146,16 +147,21 @@ static bool feed_is_past(const struct cycle_feed* feed, uint32_t cycle) {
 }
 
 bool player_swap(const struct sequence* following, uint32_t* after_cycles) {
-    count_cycles();
     // The next cycle may begin this very moment; the one after it at least a cycle (10 us) later, when its entry, which
-    // is written first, is long there.
+    // is written first, is long there: no handler may come between.
+    const uint32_t held = board_hold_interrupts();
+    count_cycles();
     const uint32_t last = begun + 1;
     *after_cycles = last + 1 - playing_from;
-    const uint32_t cycles = playing->header.cycles;
-    if (cycles != 0 && *after_cycles > cycles) return false;
-    cycle_feed_set(&timeline_feed, last, sequence_enter(playing) + 1, playing->cycle_words - 1);
-    cycle_feed_set(&timeline_feed, last + 1, sequence_enter(following), following->cycle_words + 1);
-    cycle_feed_set(&shifter_feed, last + 1, sequence_patterns(following), sequence_patterns_words(following));
+    const bool in_time = playing->header.cycles == 0 || *after_cycles <= playing->header.cycles;
+    if (in_time) {
+        cycle_feed_set(&timeline_feed, last, sequence_enter(playing) + 1, playing->cycle_words - 1);
+        cycle_feed_set(&timeline_feed, last + 1, sequence_enter(following), following->cycle_words + 1);
+        cycle_feed_set(&shifter_feed, last + 1, sequence_patterns(following), sequence_patterns_words(following));
+        schedule_swap(following, *after_cycles);
+    }
+    board_release_interrupts(held);
+    if (!in_time) return false;
     next = following;
     next_from = last + 1;
     set_cycles(following, next_from + 1, next_from + RING_USED);
@@ -194,4 +200,5 @@ void player_stop(void) {
     pio_execute(timeline, PIO_MOV_PINS_NULL);
     pio_execute(shifter, PIO_MOV_PINS_NULL);
     PIO_IRQ(PIO0_BASE) = FLAGS_ALL;
+    REGISTER(PIO_IRQ0_INTE(PIO0_BASE)) = PIO_INTE_FLAG(0) | PIO_INTE_FLAG(1) | PIO_INTE_FLAG(2);
 }

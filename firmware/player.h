@@ -16,7 +16,7 @@ enum player_event { PLAYER_TIMELINE_STARVED = 1 << 0, PLAYER_DONE = 1 << 1, PLAY
 void player_init(void);
 
 // Fills the FIFOs, connects the pins and sends the first pattern. `sequence` must stay as it is until player_stop.
-// False, with the pins dark, when the chain could not be filled. `at_edge`: play begins not with player_start but with
+// False, with the pins dark, when the chain could not be filled. After stop_guard: what has stopped is not connected. `at_edge`: play begins not with player_start but with
 // the first rise of GENLOCK after it.
 bool player_arm(const struct sequence* sequence, bool at_edge);
 
@@ -28,7 +28,7 @@ bool player_waiting(void);
 
 // Goes on with `following` at the end of a cycle: the first that can be changed in time, which is the cycle after the
 // next one or, as some are in FIFOs already, one or two later. *after_cycles says how many of the playing sequence are
-// played by then. Both must have the same lead and polarities, and both stay as they are until player_swapping ends or
+// played by then; the schedule knows it, too. Both must have the same lead and polarities, and both stay as they are until player_swapping ends or
 // player_stop. False, and nothing changes, when the playing sequence ends before that.
 bool player_swap(const struct sequence* following, uint32_t* after_cycles);
 

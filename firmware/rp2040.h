@@ -21,6 +21,8 @@ enum {
     RESET_PIO1 = 1 << 11,
     RESET_PLL_SYS = 1 << 12,
     RESET_PLL_USB = 1 << 13,
+    RESET_SPI0 = 1 << 16,
+    RESET_SPI1 = 1 << 17,
     RESET_TIMER = 1 << 21,
     RESET_USBCTRL = 1 << 24
 };
@@ -61,11 +63,12 @@ enum { PLL_PWR_PD = 1 << 0, PLL_PWR_POSTDIVPD = 1 << 3, PLL_PWR_VCOPD = 1 << 5 }
 #define CLK_REF_SELECTED REGISTER(0x40008038)
 #define CLK_SYS_CTRL 0x4000803c
 #define CLK_SYS_SELECTED REGISTER(0x40008044)
+#define CLK_PERI_CTRL REGISTER(0x40008048)
 #define CLK_USB_CTRL REGISTER(0x40008054)
 enum {
     CLK_REF_SRC_XOSC = 2,
     CLK_SYS_SRC_AUX = 1,  // the auxiliary source after reset is PLL_SYS
-    CLK_ENABLE = 1 << 11  // for clk_usb, whose source after reset is PLL_USB
+    CLK_ENABLE = 1 << 11  // for clk_usb and clk_peri, whose sources after reset are PLL_USB and clk_sys
 };
 
 // Watchdog (4.7.6)
@@ -78,7 +81,8 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 #define WATCHDOG_TRIGGER (1u << 31)
 
 // Timer, microseconds (4.6.5)
-#define TIMER_ALARM0 REGISTER(0x40054010)
+#define TIMER_ALARM(n) REGISTER(0x40054010 + 4 * (n))
+#define TIMER_ARMED REGISTER(0x40054020)  // write an alarm's bit to disarm it
 #define TIMER_RAW_HIGH REGISTER(0x40054024)
 #define TIMER_RAW_LOW REGISTER(0x40054028)
 #define TIMER_INTR REGISTER(0x40054034)
@@ -95,9 +99,13 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 #define GPIO_EDGE_LOW(pin) (4u << 4 * ((pin) % 8))
 #define GPIO_EDGE_HIGH(pin) (8u << 4 * ((pin) % 8))
 enum {
+    GPIO_FUNCTION_SPI = 1,
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
+    GPIO_FUNCTION_NONE = 31,
     GPIO_OUTPUT_INVERTED = 1 << 8,
+    GPIO_OUTPUT_LOW = 2 << 8,
+    GPIO_OUTPUT_HIGH = 3 << 8,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
     GPIO_INPUT_INVERTED = 1 << 16,
     PAD_SCHMITT = 1 << 1,
@@ -119,6 +127,14 @@ enum { QSPI_SS_AUTO = 0, QSPI_SS_LOW = 2 << 8, QSPI_SS_HIGH = 3 << 8 };
 #define SSI_DR0 REGISTER(0x18000060)
 enum { SSI_8_BITS_BOTH_WAYS = 7 << 16, SSI_SR_RECEIVED = 1 << 3 };
 
+// SPI, ARM PL022 (4.4.4)
+#define SPI_CR0(block) REGISTER(0x4003c000 + 0x4000 * (block))
+#define SPI_CR1(block) REGISTER(0x4003c004 + 0x4000 * (block))
+#define SPI_DR(block) REGISTER(0x4003c008 + 0x4000 * (block))
+#define SPI_SR(block) REGISTER(0x4003c00c + 0x4000 * (block))
+#define SPI_CPSR(block) REGISTER(0x4003c010 + 0x4000 * (block))
+enum { SPI_8_BITS = 7, SPI_MODE_1_1 = 3 << 6, SPI_ENABLE = 1 << 1, SPI_SR_RECEIVED = 1 << 2 };
+
 // Bus priority (2.1.5)
 #define BUSCTRL_BUS_PRIORITY REGISTER(0x40030000)
 enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
@@ -138,7 +154,8 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SM_ADDR(base, machine) REGISTER((base) + 0x0d4 + 0x18 * (machine))
 #define PIO_SM_INSTR(base, machine) REGISTER((base) + 0x0d8 + 0x18 * (machine))
 #define PIO_SM_PINCTRL(base, machine) REGISTER((base) + 0x0dc + 0x18 * (machine))
-#define PIO_IRQ0_INTE(base) REGISTER((base) + 0x12c)
+#define PIO_IRQ0_INTE(base) ((base) + 0x12c)
+#define PIO_IRQ1_INTE(base) ((base) + 0x138)
 #define PIO_CTRL_ENABLE(machine) (1u << (machine))
 #define PIO_CTRL_RESTART(machine) (0x11u << (4 + (machine)))  // the machine and its clock divider
 #define PIO_INTE_FLAG(flag) (1u << (8 + (flag)))
@@ -199,7 +216,8 @@ enum {
 #define USB_EP_STALL_ARM REGISTER(0x50110068)
 #define USB_MUXING REGISTER(0x50110074)
 #define USB_PWR REGISTER(0x50110078)
-#define USB_INTE REGISTER(0x50110090)
+#define USB_INTE 0x50110090
+#define USB_INTS REGISTER(0x50110098)
 #define USB_ENDPOINT_CONTROL_IN(endpoint) REGISTER(USB_MEMORY + 8 * (endpoint))
 #define USB_ENDPOINT_CONTROL_OUT(endpoint) REGISTER(USB_MEMORY + 4 + 8 * (endpoint))
 #define USB_BUFFER_CONTROL_IN(endpoint) REGISTER(USB_MEMORY + 0x80 + 8 * (endpoint))
@@ -210,6 +228,7 @@ enum {
     USB_SIE_EP0_INT_1BUF = 1 << 29,
     USB_SIE_BUS_RESET = 1 << 19,
     USB_SIE_SETUP_REC = 1 << 17,
+    USB_SIE_RESUME = 1 << 11,
     USB_SIE_SUSPENDED = 1 << 4,
     USB_MUXING_TO_PHY = 1 << 0,
     USB_MUXING_SOFTCON = 1 << 3,
@@ -217,6 +236,7 @@ enum {
     USB_PWR_VBUS_DETECT_OVERRIDE = 1 << 3,
     USB_INT_BUFF_STATUS = 1 << 4,
     USB_INT_BUS_RESET = 1 << 12,
+    USB_INT_SUSPEND = 1 << 14,
     USB_INT_SETUP_REQ = 1 << 16,
     USB_ENDPOINT_INTERRUPT = 1 << 29,
     USB_ENDPOINT_BULK = 2 << 26,
@@ -228,12 +248,31 @@ enum {
     USB_BUFFER_BYTES = 0x3ff
 };
 
+// Single-cycle IO: the divider, done 8 cycles after the divisor is written (2.3.1.5)
+#define SIO_DIV_UDIVIDEND REGISTER(0xd0000060)
+#define SIO_DIV_UDIVISOR REGISTER(0xd0000064)
+#define SIO_DIV_QUOTIENT REGISTER(0xd0000070)
+
 // Cortex-M0+ (2.4.8)
 #define NVIC_ISER REGISTER(0xe000e100)
-#define NVIC_ICER REGISTER(0xe000e180)
+#define NVIC_ISPR REGISTER(0xe000e200)
+// Two bits each, highest in a byte: 0 interrupts 1, and so on
+#define NVIC_IPR(interrupt) REGISTER(0xe000e400 + (interrupt) / 4 * 4)
+#define NVIC_PRIORITY(interrupt, priority) ((uint32_t)(priority) << (8 * ((interrupt) % 4) + 6))
 #define SCB_VTOR REGISTER(0xe000ed08)
 
-// Interrupts (2.3.2)
-enum { IRQ_TIMER_0 = 0, IRQ_USBCTRL = 5, IRQ_PIO0_0 = 7, IRQ_GPIO = 13, IRQ_COUNT = 26 };
+// Interrupts (2.3.2). Nothing but software raises 26 to 31.
+enum {
+    IRQ_TIMER_0 = 0,
+    IRQ_TIMER_1 = 1,
+    IRQ_TIMER_2 = 2,
+    IRQ_USBCTRL = 5,
+    IRQ_PIO0_0 = 7,
+    IRQ_PIO1_0 = 9,
+    IRQ_PIO1_1 = 10,
+    IRQ_GPIO = 13,
+    IRQ_CAN = 26,
+    IRQ_COUNT = 27
+};
 
 #endif

@@ -222,6 +222,8 @@ static bool add_light(struct sequence_compiler* compiler, const struct ols_slot*
     for (uint32_t plane = 0; plane < slot_planes(slot); plane++)
         if (light_add(&compiler->use, patterns + plane * words, words, slot_lit_ticks(slot, plane)) > lamps_max)
             return reject_limit(compiler->error, number, "this board's supply lights ", lamps_max, " lamps at once");
+    const uint32_t first_ticks = slot->kind == OLS_DARK ? 0 : slot_lit_ticks(slot, 0);
+    if (first_ticks > compiler->sequence->longest_light_ticks) compiler->sequence->longest_light_ticks = first_ticks;
     return true;
 }
 
@@ -254,6 +256,7 @@ void sequence_begin(struct sequence_compiler* compiler, const struct sequence_bo
     *compiler = (struct sequence_compiler){.board = board, .sequence = sequence};
     sequence->pattern_words = slot_pattern_words(board->chain_bits);
     sequence->cycle_words = 0;
+    sequence->longest_light_ticks = 0;
 }
 
 // All slots are known to be good: places the triggers, and plays the lead.

@@ -26,6 +26,7 @@ struct sequence {
     struct ols_load_begin header;
     uint16_t pattern_words;  // of one pattern
     uint32_t cycle_words;    // of the timeline, in one cycle; 0 until they are made
+    uint32_t longest_light_ticks;
     // First header.program_bytes as they were loaded, slots and patterns; then the word that enters this program, in
     // place of the last one of the program before; then those of a cycle.
     uint32_t words[SEQUENCE_WORDS_MAX];

@@ -5,15 +5,19 @@
 #include <string.h>
 
 #include "board.h"
+#include "cycle_digest.h"
 #include "fault.h"
 #include "frame.h"
+#include "light_watch.h"
 #include "player.h"
+#include "schedule.h"
 #include "sequence.h"
+#include "stop.h"
 #include "text.h"
 #include "trigger_log.h"
 #include "witness.h"
 
-enum { CHECKED_BYTES_A_TURN = 4096 };
+enum { CHECKED_BYTES_A_TURN = 4096, RECHECKED_BYTES_A_TURN = 256 };
 
 static enum ols_state state;
 static struct sequence sequences[2];
@@ -26,14 +30,16 @@ static uint32_t loaded_crc32;  // kept up chunk by chunk
 static struct sequence_compiler compiler;
 static bool compiling;
 static uint32_t sequence_crc32[2];  // of all words of each sequence, once it is made
-static uint32_t checked_bytes;      // of a sequence that is being checked, turn by turn
-static uint32_t checked_crc32;
+struct check {                      // of a sequence's words, turn by turn
+    uint32_t bytes, crc32;
+};
+static struct check checked;    // for a request
+static struct check rechecked;  // of the playing sequence, again and again
 static uint64_t start_us;
 static uint32_t stamps_read;
 static uint32_t cycles_of_done;   // of the program that has played to its end
 static bool at_edge;              // GENLOCK starts, not the command alone
-static uint32_t heartbeat_ticks;  // 0: the host may be silent
-static uint64_t heard_us;         // when the host's last request came
+static uint32_t heartbeat_us;     // 0: the host may be silent
 static uint8_t programs_swapped;  // since start
 static bool leaving;              // for the boot loader
 
@@ -63,16 +69,16 @@ static uint32_t sequence_bytes(const struct sequence* sequence) {
 
 // Goes on with the CRC of a sequence's words; true when it is complete. All at once would take half of the watchdog's
 // time.
-static bool check_words(const struct sequence* sequence) {
-    const uint32_t left = sequence_bytes(sequence) - checked_bytes;
-    const uint32_t now = left < CHECKED_BYTES_A_TURN ? left : CHECKED_BYTES_A_TURN;
-    checked_crc32 = ols_crc32(checked_crc32, (const uint8_t*)sequence->words + checked_bytes, now);
-    checked_bytes += now;
+static bool check_words(struct check* check, const struct sequence* sequence, uint32_t bytes_a_turn) {
+    const uint32_t left = sequence_bytes(sequence) - check->bytes;
+    const uint32_t now = left < bytes_a_turn ? left : bytes_a_turn;
+    check->crc32 = ols_crc32(check->crc32, (const uint8_t*)sequence->words + check->bytes, now);
+    check->bytes += now;
     return now == left;
 }
 
-static bool words_are_good(const struct sequence* sequence) {
-    return checked_crc32 == sequence_crc32[sequence - sequences];
+static bool words_are_good(const struct check* check, const struct sequence* sequence) {
+    return check->crc32 == sequence_crc32[sequence - sequences];
 }
 
 static void forget_next(void) {
@@ -88,28 +94,16 @@ static void forget_programs(void) {
 
 // The spare program becomes the current one.
 static void take_next(void) {
+    rechecked = (struct check){0};
     struct sequence* const before = current;
     current = spare;
     spare = before;
     next = OLS_NEXT_NONE;
 }
 
-// Play is over: a program that was ready to follow is the one to play next.
-static void end_play(enum ols_state ended) {
-    player_stop();
-    fault_note_idle();
-    if (next == OLS_NEXT_READY || next == OLS_NEXT_SWAPPING) take_next();
-    state = ended;
-}
-
-static void end_in_fault(enum ols_fault cause, uint64_t ticks) {
-    fault_latch(cause, trigger_log_slot(), ticks);
-    forget_next();
-    state = OLS_STATE_FAULT;
-}
-
 void stage_init(void) {
     leaving = false;
+    stop_unguard();
     forget_programs();
     trigger_log_begin(current);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;
@@ -128,33 +122,85 @@ static bool read_witness(void) {
     return true;
 }
 
+static void latch(struct stop stop) {
+    const bool playing = state == OLS_STATE_PLAYING;
+    if (playing) read_witness();
+    fault_latch(stop.cause, trigger_log_slot(),
+                playing && stop.us > start_us ? (stop.us - start_us) * BOARD_TICKS_PER_US : 0);
+    cycle_digest_end(false);
+    board_expect_message(0);
+    forget_next();
+    state = OLS_STATE_FAULT;
+}
+
+// Dark, and the cause is latched; or that of a handler, if it has come before.
+static void end_in_fault(enum ols_fault cause) {
+    stop_now(cause);
+    const struct stop stop = stop_unguard();
+    latch(stop.cause != OLS_FAULT_NONE ? stop : (struct stop){cause, board_time_us()});  // none: nothing was guarded
+}
+
+// Play is over: a program that was ready to follow is the one to play next. False when a handler has stopped it.
+static bool end_play(enum ols_state ended) {
+    const struct stop stop = stop_unguard();
+    if (stop.cause != OLS_FAULT_NONE) {
+        latch(stop);
+        return false;
+    }
+    board_expect_message(0);
+    player_stop();
+    fault_note_idle();
+    if (next == OLS_NEXT_READY || next == OLS_NEXT_SWAPPING) take_next();
+    state = ended;
+    return true;
+}
+
+// Once more through the playing program's words, a part each turn: 94 KB take 376 turns.
+static bool words_stay_good(void) {
+    if (!check_words(&rechecked, current, RECHECKED_BYTES_A_TURN)) return true;
+    const bool good = words_are_good(&rechecked, current);
+    rechecked = (struct check){0};
+    return good;
+}
+
+static void end_swap(void) {
+    take_next();
+    schedule_settle();
+    light_watch_allow(current->longest_light_ticks);
+}
+
 static void follow_play(void) {
     // Events first: when all cycles are played, all triggers have fired.
     const uint32_t events = player_events();
     const bool on_time = read_witness();
-    const uint64_t now_ticks = ticks_since_start();
-    if (events & PLAYER_TIMELINE_STARVED) return end_in_fault(OLS_FAULT_TIMELINE_STARVED, now_ticks);
-    if (events & PLAYER_SHIFTER_STARVED) return end_in_fault(OLS_FAULT_SHIFTER_STARVED, now_ticks);
-    if (!on_time) return end_in_fault(OLS_FAULT_SLIPPED, now_ticks);
+    if (events & PLAYER_TIMELINE_STARVED) return end_in_fault(OLS_FAULT_TIMELINE_STARVED);
+    if (events & PLAYER_SHIFTER_STARVED) return end_in_fault(OLS_FAULT_SHIFTER_STARVED);
+    if (!on_time) return end_in_fault(OLS_FAULT_SLIPPED);
+    if (!words_stay_good()) return end_in_fault(OLS_FAULT_BAD_MEMORY);
     if (events & PLAYER_DONE) {
         if (next == OLS_NEXT_SWAPPING) take_next();
         cycles_of_done = current->header.cycles;
-        return end_play(OLS_STATE_DONE);
+        end_play(OLS_STATE_DONE);
+        cycle_digest_end(state == OLS_STATE_DONE);
+        return;
     }
     player_poll();
-    if (next == OLS_NEXT_SWAPPING && !player_swapping()) take_next();
-    fault_note_progress(trigger_log_slot(), now_ticks);
+    if (next == OLS_NEXT_SWAPPING && !player_swapping()) end_swap();
+    fault_note_progress(trigger_log_slot(), ticks_since_start());
 }
 
-// The fault that a stop input, or the host's silence, means; OLS_FAULT_NONE when all is well. For the first two inputs it
-// is dark already (pulse.pio, guard).
-static enum ols_fault cause_from_outside(uint32_t stops, bool host_is_there) {
+// The fault that a level of the stop inputs, or the host's absence, means; OLS_FAULT_NONE when all is well. Handlers have
+// seen the change before this does (interrupts.h).
+static enum ols_fault cause_from_outside(bool host_is_there) {
+    const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP) return OLS_FAULT_EMERGENCY_STOP;
     if (stops & 1u << BOARD_OVER_TEMPERATURE) return OLS_FAULT_OVER_TEMPERATURE;
     if (stops & 1u << BOARD_OPEN_LAMP) return OLS_FAULT_OPEN_LAMP;
-    if (!host_is_there) return OLS_FAULT_HOST_LOST;
-    const uint64_t silent_ticks = (board_time_us() - heard_us) * BOARD_TICKS_PER_US;
-    return heartbeat_ticks != 0 && silent_ticks > heartbeat_ticks ? OLS_FAULT_HEARTBEAT : OLS_FAULT_NONE;
+    return host_is_there ? OLS_FAULT_NONE : OLS_FAULT_HOST_LOST;
+}
+
+bool stage_is_armed(void) {
+    return state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
 }
 
 static void begin_play(void) {
@@ -163,16 +209,11 @@ static void begin_play(void) {
 }
 
 void stage_poll(bool host_is_there) {
-    const uint32_t stops = board_stop_inputs();  // in every state: an edge that nobody takes would not let it sleep
-    board_forget_genlock();
-    if (state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) {
+    if (stage_is_armed()) {
         // First, for the program's own faults may be its consequences.
-        const enum ols_fault cause = cause_from_outside(stops, host_is_there);
-        if (cause != OLS_FAULT_NONE) {
-            const bool playing = state == OLS_STATE_PLAYING;
-            if (playing) read_witness();
-            return end_in_fault(cause, playing ? ticks_since_start() : 0);
-        }
+        const enum ols_fault cause = cause_from_outside(host_is_there);
+        if (cause != OLS_FAULT_NONE) return end_in_fault(cause);
+        if (stop_seen() != OLS_FAULT_NONE) return end_in_fault(stop_seen());
     }
     if (state == OLS_STATE_WAITING && !player_waiting()) begin_play();
     if (state == OLS_STATE_PLAYING) follow_play();
@@ -228,13 +269,9 @@ static enum stage_answer make_sequence(struct ols_error_reply* error) {
     }
     if (spare->cycle_words == 0)
         return sequence_step(&compiler, error) == SEQUENCE_REFUSED ? STAGE_REFUSED : STAGE_BUSY;
-    if (checked_bytes == 0) {
-        // What was loaded has its CRC already.
-        checked_bytes = loaded_bytes;
-        checked_crc32 = loaded_crc32;
-    }
-    if (!check_words(spare)) return STAGE_BUSY;
-    sequence_crc32[spare - sequences] = checked_crc32;
+    if (checked.bytes == 0) checked = (struct check){loaded_bytes, loaded_crc32};  // which has its CRC already
+    if (!check_words(&checked, spare, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
+    sequence_crc32[spare - sequences] = checked.crc32;
     return STAGE_OK;
 }
 
@@ -254,19 +291,20 @@ enum stage_answer stage_load_end(struct ols_error_reply* error) {
     return answer;
 }
 
-void stage_begin_request(void) {
-    heard_us = board_time_us();
-    checked_bytes = 0;
-    checked_crc32 = 0;
+void stage_begin_request(bool from_owner) {
+    if (from_owner && stage_is_armed()) board_expect_message(heartbeat_us);
+    checked = (struct check){0};
+}
+
+static bool arm_is_valid(const struct ols_arm* arm, struct ols_error_reply* error) {
+    if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
+        return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
+    return (arm->start_source <= OLS_START_BY_EDGE && !arm->reserved[0] && !arm->reserved[1] && !arm->reserved[2]) ||
+           refuse(error, OLS_ERROR_BAD_PROGRAM, "start_source is 0 (command) or 1 (edge), reserved fields are 0");
 }
 
 // What must be so before anything may be lit.
-static bool arm_is_safe(const struct ols_arm* arm, struct ols_error_reply* error) {
-    if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
-        return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
-    if (arm->start_source > OLS_START_BY_EDGE || arm->reserved[0] || arm->reserved[1] || arm->reserved[2])
-        return refuse(error, OLS_ERROR_BAD_PROGRAM, "start_source is 0 (command) or 1 (edge), reserved fields are 0");
-    board_stop_inputs();  // forgets edges of the past
+static bool arm_is_safe(struct ols_error_reply* error) {
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP)
         return refuse(error, OLS_ERROR_NOT_SAFE, "the emergency stop is pressed, or its wire is open: release it");
@@ -279,24 +317,33 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
         refuse_state(error, "no program is ready: load one, and stop what is armed or playing");
         return STAGE_REFUSED;
     }
-    if (checked_bytes == 0 && !arm_is_safe(arm, error)) return STAGE_REFUSED;
-    if (!check_words(current)) return STAGE_BUSY;
-    if (!words_are_good(current)) {
-        end_in_fault(OLS_FAULT_BAD_MEMORY, 0);
+    if (!arm_is_valid(arm, error)) return STAGE_REFUSED;
+    if (!check_words(&checked, current, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
+    if (!words_are_good(&checked, current)) {
+        end_in_fault(OLS_FAULT_BAD_MEMORY);
         refuse_fault(error);
         return STAGE_REFUSED;
     }
+    stop_guard();  // before the look at the inputs, so that no fall is between them
+    if (!arm_is_safe(error)) {
+        stop_unguard();
+        return STAGE_REFUSED;
+    }
     trigger_log_begin(current);
+    schedule_begin(current);
     programs_swapped = 0;
     stamps_read = 0;
     at_edge = arm->start_source == OLS_START_BY_EDGE;
     witness_arm(at_edge);
+    light_watch_arm(current->longest_light_ticks);
+    rechecked = (struct check){0};
     if (!player_arm(current, at_edge)) {
-        end_in_fault(OLS_FAULT_SHIFTER_STARVED, 0);
+        end_in_fault(OLS_FAULT_SHIFTER_STARVED);
         refuse_fault(error);
         return STAGE_REFUSED;
     }
-    heartbeat_ticks = arm->heartbeat_ticks;
+    heartbeat_us = arm->heartbeat_ticks / BOARD_TICKS_PER_US;
+    board_expect_message(heartbeat_us);
     state = OLS_STATE_ARMED;
     return STAGE_OK;
 }
@@ -314,8 +361,9 @@ bool stage_stop(struct ols_error_reply* error) {
     if (state == OLS_STATE_IDLE || state == OLS_STATE_FAULT)
         return refuse_state(error, "nothing to stop: no program is loaded");
     const bool was_playing = state == OLS_STATE_PLAYING;
-    end_play(OLS_STATE_LOADED);
+    if (!end_play(OLS_STATE_LOADED)) return refuse_fault(error);
     if (was_playing) read_witness();
+    cycle_digest_end(false);
     return true;
 }
 
@@ -333,15 +381,17 @@ enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_repl
         refuse_state(error, "nothing to swap: load the next program while one is playing");
         return STAGE_REFUSED;
     }
-    if (!check_words(spare)) return STAGE_BUSY;
-    if (!words_are_good(spare)) {
-        end_in_fault(OLS_FAULT_BAD_MEMORY, ticks_since_start());
+    if (!check_words(&checked, spare, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
+    if (!words_are_good(&checked, spare)) {
+        end_in_fault(OLS_FAULT_BAD_MEMORY);
         refuse_fault(error);
         return STAGE_REFUSED;
     }
     if (!next_fits(error)) return STAGE_REFUSED;
     uint32_t after_cycles;
+    if (spare->longest_light_ticks > current->longest_light_ticks) light_watch_allow(spare->longest_light_ticks);
     if (!player_swap(spare, &after_cycles)) {
+        light_watch_allow(current->longest_light_ticks);
         refuse(error, OLS_ERROR_BAD_STATE, "the playing program ends before a swap: arm and start the next one then");
         return STAGE_REFUSED;
     }
@@ -367,9 +417,18 @@ bool stage_is_leaving(void) {
     return leaving;
 }
 
+static uint32_t cycles_played(void) {
+    return state == OLS_STATE_DONE ? cycles_of_done : trigger_log_cycle();
+}
+
+struct ols_canbus_state stage_summary(void) {
+    const struct fault fault = fault_latched();
+    return (struct ols_canbus_state){
+        .state = (uint8_t)state, .fault = (uint8_t)fault.cause, .fault_slot = fault.slot, .cycles_played = cycles_played()};
+}
+
 void stage_status(struct ols_status_reply* status) {
     const struct fault fault = fault_latched();
-    const bool done = state == OLS_STATE_DONE;
     *status = (struct ols_status_reply){.state = (uint8_t)state,
                                         .fault = (uint8_t)fault.cause,
                                         .fault_slot = fault.slot,
@@ -377,7 +436,7 @@ void stage_status(struct ols_status_reply* status) {
                                         .fault_ticks = fault.ticks,
                                         .now_ticks = state == OLS_STATE_PLAYING ? ticks_since_start() : 0,
                                         .triggers_fired = trigger_log_fired(),
-                                        .cycles_played = done ? cycles_of_done : trigger_log_cycle(),
+                                        .cycles_played = cycles_played(),
                                         .log_entries_lost = trigger_log_lost(),
                                         .program_crc32 = current->header.program_crc32,
                                         .next = (uint8_t)next};

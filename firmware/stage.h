@@ -19,8 +19,9 @@ void stage_poll(bool host_is_there);
 // The answer to a command that may take more than a turn of the main loop: while it is busy, ask again in the next one.
 enum stage_answer { STAGE_OK, STAGE_REFUSED, STAGE_BUSY };
 
-// To be called before a command, or anything else that the host asks, is answered for the first time: a sign of life.
-void stage_begin_request(void);
+// To be called before a command, or anything else that a host asks, is answered for the first time: a sign of life, if it
+// comes from the host that armed.
+void stage_begin_request(bool from_owner);
 
 // Commands. False, or STAGE_REFUSED, with `error` filled in when refused; nothing has changed then, except that a program
 // whose loading failed is gone.
@@ -38,5 +39,11 @@ bool stage_leave(struct ols_error_reply* error);
 bool stage_is_leaving(void);
 
 void stage_status(struct ols_status_reply* status);
+
+// The gist of the status, for everybody on the bus.
+struct ols_canbus_state stage_summary(void);
+
+// Armed, waiting for the edge that starts, or playing.
+bool stage_is_armed(void);
 
 #endif

@@ -4,6 +4,7 @@
 
 #include "board_rp2040.h"
 #include "fault.h"
+#include "interrupts.h"
 #include "rp2040.h"
 
 // Addresses from stage.ld.
@@ -40,12 +41,18 @@ __attribute__((aligned(256))) const vector vectors[16 + IRQ_COUNT] = {
     [0] = {stack_top},
     [1] = {.handler = reset},
     [2 ... 15] = {.handler = unexpected_exception},
-    [16 + IRQ_TIMER_0] = {.handler = board_wake_interrupt},
-    [17 + IRQ_TIMER_0... 15 + IRQ_USBCTRL] = {.handler = unexpected_exception},
-    [16 + IRQ_USBCTRL] = {.handler = board_wake_interrupt},
+    [16 + IRQ_TIMER_0] = {.handler = interrupt_tick},
+    [16 + IRQ_TIMER_1] = {.handler = interrupt_heartbeat},
+    [16 + IRQ_TIMER_2] = {.handler = interrupt_trigger_late},
+    [17 + IRQ_TIMER_2... 15 + IRQ_USBCTRL] = {.handler = unexpected_exception},
+    [16 + IRQ_USBCTRL] = {.handler = interrupt_usb},
     [17 + IRQ_USBCTRL... 15 + IRQ_PIO0_0] = {.handler = unexpected_exception},
-    [16 + IRQ_PIO0_0] = {.handler = board_wake_interrupt},
-    [17 + IRQ_PIO0_0... 15 + IRQ_GPIO] = {.handler = unexpected_exception},
-    [16 + IRQ_GPIO] = {.handler = board_wake_interrupt},
-    [17 + IRQ_GPIO... 15 + IRQ_COUNT] = {.handler = unexpected_exception},
+    [16 + IRQ_PIO0_0] = {.handler = interrupt_player},
+    [17 + IRQ_PIO0_0... 15 + IRQ_PIO1_0] = {.handler = unexpected_exception},
+    [16 + IRQ_PIO1_0] = {.handler = interrupt_light},
+    [16 + IRQ_PIO1_1] = {.handler = interrupt_trigger},
+    [17 + IRQ_PIO1_1... 15 + IRQ_GPIO] = {.handler = unexpected_exception},
+    [16 + IRQ_GPIO] = {.handler = interrupt_stop_inputs},
+    [17 + IRQ_GPIO... 15 + IRQ_CAN] = {.handler = unexpected_exception},
+    [16 + IRQ_CAN] = {.handler = mcp2515_interrupt},
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Transport: a byte stream to the host and back. usb.c is one.
+// Transport: a byte stream to a host and back. usb.c and can.c are the two.
 #ifndef OLS_TRANSPORT_H
 #define OLS_TRANSPORT_H
 
@@ -9,19 +9,21 @@
 
 enum { TRANSPORT_PACKET_BYTES = 64 };
 
-// True while a host has set the board up and the bus is alive.
-bool transport_is_attached(void);
+struct transport {
+    // True while a host has set the board up and the bus is alive.
+    bool (*is_attached)(void);
 
-// Counts attachments: when it changes, bytes before and after do not belong together.
-uint32_t transport_session(void);
+    // Counts attachments: when it changes, bytes before and after do not belong together.
+    uint32_t (*session)(void);
 
-// Moves a received packet to `bytes` (room for TRANSPORT_PACKET_BYTES); 0 when there is none.
-size_t transport_receive(uint8_t* bytes);
+    // Moves what was received to `bytes` (room for TRANSPORT_PACKET_BYTES); 0 when there is nothing.
+    size_t (*receive)(uint8_t* bytes);
 
-// True when the previous send is over.
-bool transport_can_send(void);
+    // True when the previous send is over.
+    bool (*can_send)(void);
 
-// Sends; `bytes` must stay as they are until transport_can_send.
-void transport_send(const uint8_t* bytes, size_t byte_count);
+    // Sends; `bytes` must stay as they are until can_send.
+    void (*send)(const uint8_t* bytes, size_t byte_count);
+};
 
 #endif

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "cycle_digest.h"
 #include "pulse.h"
 
 enum {
@@ -42,6 +43,7 @@ void trigger_log_begin(const struct sequence* sequence) {
     oldest = fired = read_to = lost = next_slot = cycle = program = 0;
     scheduled_ticks = 0;
     last = (struct kept){.slot = OLS_NO_SLOT};
+    cycle_digest_begin();
 }
 
 void trigger_log_swap(const struct sequence* next, uint32_t after_cycles) {
@@ -87,6 +89,16 @@ static uint64_t rise_from_stamp(uint32_t stamp, uint64_t now_ticks) {
     return counts < 0 ? 0 : (uint64_t)counts * WITNESS_COUNT_TICKS;
 }
 
+static struct ols_trigger_log_entry entry_of(uint32_t counter) {
+    const struct kept* const kept = &entries[counter % LOG_ENTRIES];
+    return (struct ols_trigger_log_entry){.rise_ticks = kept->rise_ticks,
+                                          .counter = counter,
+                                          .cycle = kept->cycle,
+                                          .slot = kept->slot,
+                                          .trigger_mask = kept->trigger_mask,
+                                          .program = kept->program};
+}
+
 bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
     if (!find_slot()) return false;
     if (fired - oldest == LOG_ENTRIES && oldest++ >= read_to) lost++;
@@ -96,6 +108,8 @@ bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
                          .trigger_mask = (uint8_t)triggers_of_next_slot(),
                          .program = program};
     entries[fired % LOG_ENTRIES] = last;
+    const struct ols_trigger_log_entry entry = entry_of(fired);
+    cycle_digest_add(&entry);
     const int64_t offset_ticks = sequence_trigger_offset_ticks(played, &sequence_slots(played)[next_slot], 0);
     const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks - offset_ticks;
     if (fired == 0) first_error_ticks = error_ticks;
@@ -108,6 +122,7 @@ bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
 void trigger_log_skip(uint32_t count) {
     const uint32_t unread_from = read_to > oldest ? read_to : oldest;
     lost += fired - unread_from + count;
+    cycle_digest_skip();
     for (; count > 0 && find_slot(); count--) {
         step_slot();
         fired++;
@@ -121,15 +136,7 @@ void trigger_log_read(uint32_t first, uint16_t entries_max, struct ols_trigger_l
     if (first > fired) first = fired;
     uint32_t count = fired - first;
     if (count > entries_max) count = entries_max;
-    for (uint32_t i = 0; i < count; i++) {
-        const struct kept* const kept = &entries[(first + i) % LOG_ENTRIES];
-        out[i] = (struct ols_trigger_log_entry){.rise_ticks = kept->rise_ticks,
-                                                .counter = first + i,
-                                                .cycle = kept->cycle,
-                                                .slot = kept->slot,
-                                                .trigger_mask = kept->trigger_mask,
-                                                .program = kept->program};
-    }
+    for (uint32_t i = 0; i < count; i++) out[i] = entry_of(first + i);
     if (first + count > read_to) read_to = first + count;
     *header = (struct ols_trigger_log_reply){
         .first_counter = first, .next_counter = fired, .entries_lost = lost, .entry_count = (uint16_t)count};

@@ -7,7 +7,6 @@
 
 #include "board.h"
 #include "rp2040.h"
-#include "transport.h"
 
 enum { ENDPOINT_OUT = 1, ENDPOINT_IN = 2, PACKET_BYTES = TRANSPORT_PACKET_BYTES };
 enum { BUFFER_EP0 = 0x100, BUFFER_OUT = 0x180, BUFFER_IN = 0x1c0 };  // in the controller's memory (4.1.2.5)
@@ -17,6 +16,9 @@ enum {
     DONE_OUT = 1 << (2 * ENDPOINT_OUT + 1),
     DONE_IN = 1 << 2 * ENDPOINT_IN
 };
+
+// The handler masks what has come up; usb_poll deals with it.
+enum { INTERRUPTS = USB_INT_BUFF_STATUS | USB_INT_BUS_RESET | USB_INT_SUSPEND | USB_INT_SETUP_REQ };
 
 // Requests of USB 2.0 9.4, as bRequest << 8 | bmRequestType.
 enum {
@@ -78,8 +80,8 @@ static const uint8_t language_descriptor[] = {4, DESCRIPTOR_STRING, 0x09, 0x04};
 static char serial_number[2 * 8 + 1];  // the flash chip's unique number, in hex
 static const char* const strings[] = {"open light stage", "light stage sequencer", serial_number};
 
-static bool configured;
-static uint32_t session;
+static bool configured, suspended;
+static uint32_t attachments;
 static uint8_t new_address;  // not zero: takes effect when the status stage is over
 static bool out_toggle, in_toggle;
 static size_t received_bytes;
@@ -150,7 +152,7 @@ static void set_configuration(uint16_t value) {
     reset_endpoints();
     configured = value == 1;
     if (!configured) return;
-    session++;
+    attachments++;
     USB_ENDPOINT_CONTROL_OUT(ENDPOINT_OUT) =
         USB_ENDPOINT_ENABLE | USB_ENDPOINT_INTERRUPT | USB_ENDPOINT_BULK | BUFFER_OUT;
     USB_ENDPOINT_CONTROL_IN(ENDPOINT_IN) = USB_ENDPOINT_ENABLE | USB_ENDPOINT_INTERRUPT | USB_ENDPOINT_BULK | BUFFER_IN;
@@ -218,7 +220,7 @@ void usb_init(void) {
     USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
     USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE;  // the board is powered by the bus it talks to
     REGISTER(USB_SIE_CTRL) = USB_SIE_EP0_INT_1BUF;
-    USB_INTE = USB_INT_BUFF_STATUS | USB_INT_BUS_RESET | USB_INT_SETUP_REQ;
+    REGISTER(USB_INTE) = INTERRUPTS;
     USB_MAIN_CTRL = 1;  // controller on, as a device
     REGISTER_SET(USB_SIE_CTRL) = USB_SIE_PULLUP;
 }
@@ -246,9 +248,13 @@ void usb_poll(void) {
     if (status & USB_SIE_BUS_RESET) {
         USB_SIE_STATUS_CLEAR = USB_SIE_BUS_RESET;
         USB_ADDR_ENDP = 0;
-        configured = false;
+        configured = suspended = false;
         new_address = 0;
         reset_endpoints();
+    }
+    if (status & (USB_SIE_SUSPENDED | USB_SIE_RESUME)) {
+        USB_SIE_STATUS_CLEAR = status & (USB_SIE_SUSPENDED | USB_SIE_RESUME);
+        suspended = !(status & USB_SIE_RESUME);
     }
     // Before setup packets: a finished SET_ADDRESS takes effect before what is asked next.
     if (USB_BUFF_STATUS) handle_done_buffers();
@@ -256,17 +262,18 @@ void usb_poll(void) {
         USB_SIE_STATUS_CLEAR = USB_SIE_SETUP_REC;
         handle_setup();
     }
+    REGISTER_SET(USB_INTE) = INTERRUPTS;
 }
 
-bool transport_is_attached(void) {
-    return configured && !(USB_SIE_STATUS & USB_SIE_SUSPENDED);
+static bool is_attached(void) {
+    return configured && !suspended;
 }
 
-uint32_t transport_session(void) {
-    return session;
+static uint32_t session(void) {
+    return attachments;
 }
 
-size_t transport_receive(uint8_t* bytes) {
+static size_t receive(uint8_t* bytes) {
     if (!received) return 0;
     for (size_t i = 0; i < received_bytes; i++) bytes[i] = buffer_at(BUFFER_OUT)[i];
     received = false;
@@ -275,12 +282,14 @@ size_t transport_receive(uint8_t* bytes) {
     return byte_count;
 }
 
-bool transport_can_send(void) {
+static bool can_send(void) {
     return configured && !in_busy && sending_bytes == 0;
 }
 
-void transport_send(const uint8_t* bytes, size_t byte_count) {
+static void send(const uint8_t* bytes, size_t byte_count) {
     sending = bytes;
     sending_bytes = byte_count;
     send_packet();
 }
+
+const struct transport usb_transport = {is_attached, session, receive, can_send, send};

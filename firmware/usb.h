@@ -3,10 +3,14 @@
 #ifndef OLS_USB_H
 #define OLS_USB_H
 
+#include "transport.h"
+
 // Appears on the bus. Once, after board_init.
 void usb_init(void);
 
 // Once each turn of the main loop: serves control requests and moves packets.
 void usb_poll(void);
+
+extern const struct transport usb_transport;
 
 #endif

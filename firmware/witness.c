@@ -3,6 +3,7 @@
 #include "witness.h"
 
 #include "board.h"
+#include "board_rp2040.h"
 #include "pio.h"
 #include "pulse.h"
 
@@ -20,9 +21,12 @@ void witness_init(void) {
     PIO_SM_EXECCTRL(PIO1_BASE, machine.machine) =
         PIO_EXEC_WRAP(WITNESS_WRAP_TARGET, WITNESS_WRAP) | PIO_EXEC_JMP_PIN(BOARD_PIN_TRIG0);
     PIO_SM_PINCTRL(PIO1_BASE, machine.machine) = PIO_PINS_IN(BOARD_PIN_GENLOCK);
+    REGISTER(PIO_IRQ1_INTE(PIO1_BASE)) = PIO_INTE_FLAG(WITNESS_STAMPED);
 }
 
 void witness_arm(bool at_edge) {
+    TIMER_ARMED = 1u << BOARD_ALARM_TRIGGER;  // of the run before
+    PIO_IRQ(PIO1_BASE) = 1u << WITNESS_STAMPED;
     DMA_AL1_CTRL(CHANNEL) = 0;
     DMA_CHAN_ABORT = 1u << CHANNEL;
     while (DMA_AL1_CTRL(CHANNEL) & DMA_CTRL_BUSY) {

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 enum { WITNESS_RING_STAMPS = 1024 };
+enum { WITNESS_STAMPED = 0, WITNESS_LIGHT_TOO_LONG = 1 };  // flags of PIO block 1, as in pulse.pio
 
 void witness_init(void);
 // `at_edge`: counts from the first rise of GENLOCK after witness_start, not from that.

@@ -26,6 +26,7 @@ OLS_WIRE_ASSERT(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the wire is little-e
 #define OLS_CYCLES_MAX 524288       // of one program, when counted
 #define OLS_CHAIN_BITS_MAX 256      // 8 words: a whole pattern must fit the shifter's FIFO (RP2040 datasheet 3.5.4)
 #define OLS_LOG_ENTRIES_MAX 48      // of one reply
+#define OLS_DIGESTS_MAX 31          // of one reply
 #define OLS_NO_SLOT 0xffff          // where no slot is to blame
 #define OLS_REPLY 0x80              // a reply's type is its request's with this bit
 
@@ -53,6 +54,7 @@ enum ols_message {
     OLS_READ_TRIGGER_LOG = 0x09,      // ols_read_trigger_log -> ols_trigger_log_reply and entries, in any state
     OLS_CLEAR_FAULT = 0x0a,           // fault -> idle; the program must be loaded again
     OLS_SWAP = 0x0b,                  // playing with a next program ready -> ols_swap_reply; goes on with that
+    OLS_READ_DIGESTS = 0x0c,          // ols_read_digests -> ols_digests_reply and digests, in any state
     OLS_REBOOT_TO_BOOTLOADER = 0x0d,  // not while armed or playing; the board leaves after the reply, to be flashed
     OLS_ERROR = 0x7f                  // only as reply, OLS_ERROR | OLS_REPLY: ols_error_reply
 };
@@ -66,7 +68,9 @@ enum ols_capability {
     OLS_CAN_OFFSET_TRIGGERS = 1,  // triggers may have offsets, widths and polarities of their own
     OLS_CAN_START_BY_EDGE = 4,    // of GENLOCK
     OLS_CAN_GREY = 8,             // slots may have planes
-    OLS_CAN_SWAP = 2              // the next program can be loaded while one plays
+    OLS_CAN_SWAP = 2,             // the next program can be loaded while one plays
+    OLS_CAN_SPEAK_CAN = 32,       // a CAN controller was found at start
+    OLS_CAN_DIGEST = 64           // keeps a digest of each cycle
 };
 
 struct ols_hello_reply {
@@ -179,7 +183,8 @@ enum ols_fault {
     OLS_FAULT_EMERGENCY_STOP = 8,    // the emergency stop was pressed, or its wire is open
     OLS_FAULT_OVER_TEMPERATURE = 9,  // said a lamp driver
     OLS_FAULT_OPEN_LAMP = 10,        // said a lamp driver
-    OLS_FAULT_HEARTBEAT = 11         // no message from the host for the time chosen when arming
+    OLS_FAULT_HEARTBEAT = 11,        // no message from the host for the time chosen when arming
+    OLS_FAULT_OVER_DUTY = 12         // a light was longer, measured at the pin, than any of the program's
 };
 
 struct ols_status_reply {
@@ -221,6 +226,101 @@ struct ols_trigger_log_entry {
     uint8_t program;  // how many programs have been swapped in since start, modulo 256
 } OLS_PACKED;
 
+struct ols_read_digests {
+    uint32_t first_digest;
+    uint16_t digests_max;
+    uint16_t reserved;  // 0
+} OLS_PACKED;
+
+struct ols_digests_reply {
+    uint32_t first_digest;  // number of the first that follows
+    uint32_t next_digest;   // number that the next one will have
+    uint32_t digests_lost;  // since start: overwritten before the host has read them
+    uint16_t digest_count;
+    uint16_t reserved;  // 0
+} OLS_PACKED;
+
+enum ols_digest_flags {
+    OLS_DIGEST_INCOMPLETE = 1  // the cycle fired triggers that the log lost, or play ended in it
+};
+
+// What the trigger log says of one cycle. A host that has all its entries can tell: it makes the same of them.
+struct ols_cycle_digest {
+    uint64_t first_rise_ticks;
+    uint64_t last_rise_ticks;
+    uint32_t first_counter;  // of its first entry
+    uint32_t cycle;          // of its program
+    uint32_t entries_crc32;  // of all its ols_trigger_log_entry in order
+    uint16_t trigger_count;  // of entries
+    uint8_t program;         // as in log entries
+    uint8_t flags;           // enum ols_digest_flags bits
+} OLS_PACKED;
+
+// CAN identifiers, 11 bits. Of a board: + 16 times its number, 0 to 15. The lower wins the bus: news before bulk.
+enum ols_canbus_id {
+    OLS_CANBUS_STATE = 0x100,       // ols_canbus_state
+    OLS_CANBUS_CYCLE = 0x101,       // ols_canbus_cycle
+    OLS_CANBUS_FIRST_RISE = 0x102,  // ols_canbus_rise
+    OLS_CANBUS_LAST_RISE = 0x103,   // ols_canbus_rise
+    OLS_CANBUS_CYCLE_CRC = 0x104,   // ols_canbus_cycle_crc
+    OLS_CANBUS_HEALTH = 0x105,      // ols_canbus_health
+    OLS_CANBUS_LAMP_NODE = 0x200,   // + the lamp node's number, 0 to 255: ols_canbus_lamp_node
+    OLS_CANBUS_TO_BOARD = 0x600,    // ISO-TP: requests, and flow control of replies
+    OLS_CANBUS_TO_HOST = 0x608      // ISO-TP: replies, and flow control of requests
+};
+
+// Sent by the board when it changes, and every 50 ms.
+struct ols_canbus_state {
+    uint8_t state;        // enum ols_state
+    uint8_t fault;        // enum ols_fault
+    uint16_t fault_slot;  // or OLS_NO_SLOT
+    uint32_t cycles_played;
+} OLS_PACKED;
+
+// A cycle's digest, in four frames.
+struct ols_canbus_cycle {
+    uint32_t cycle;
+    uint16_t trigger_count;
+    uint8_t program;
+    uint8_t flags;  // enum ols_digest_flags bits
+} OLS_PACKED;
+
+struct ols_canbus_rise {
+    uint32_t rise_ticks_low;   // bits 0 to 31
+    uint16_t rise_ticks_high;  // bits 32 to 47
+    uint16_t cycle_low;        // bits 0 to 15 of the cycle that this is about
+} OLS_PACKED;
+
+struct ols_canbus_cycle_crc {
+    uint32_t cycle;
+    uint32_t entries_crc32;
+} OLS_PACKED;
+
+// Sent by the board when it changes, and every second.
+struct ols_canbus_health {
+    uint16_t frames_lost;      // since reset: received without room for them, or given up unsent
+    uint16_t messages_lost;    // since reset: in part received or sent, then given up (isotp.h)
+    uint16_t bus_offs;         // since reset
+    uint8_t last_error;        // enum isotp_error of the last message lost
+    uint8_t controller_flags;  // MCP2515 datasheet, register 6-3, EFLG
+} OLS_PACKED;
+
+enum ols_lamp_fault {
+    OLS_LAMP_OVER_TEMPERATURE = 1,
+    OLS_LAMP_OPEN = 2,
+    OLS_LAMP_SHORTED = 4,
+    OLS_LAMP_UNDER_VOLTAGE = 8
+};
+
+// Sent by a lamp node (one driver of 16 outputs) every second, and at once when `faults` changes.
+struct ols_canbus_lamp_node {
+    int16_t temperature_centi_c;  // of the driver, hundredths of a degree Celsius
+    uint16_t current_ma;          // drawn by all its lamps
+    uint16_t open_outputs;        // bit k: nothing conducts at output k
+    uint8_t faults;               // enum ols_lamp_fault bits
+    uint8_t count;                // of frames sent, modulo 256: shows losses
+} OLS_PACKED;
+
 enum ols_error_code {
     OLS_ERROR_UNKNOWN_MESSAGE = 1,
     OLS_ERROR_BAD_LENGTH = 2,
@@ -253,8 +353,20 @@ OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) == 16, "trigger log reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_entry) == 20, "trigger log entry");
 OLS_WIRE_ASSERT(sizeof(struct ols_error_reply) == 120, "error reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_read_digests) == 8, "read digests");
+OLS_WIRE_ASSERT(sizeof(struct ols_digests_reply) == 16, "digests reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_cycle_digest) == 32, "cycle digest");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_state) == 8, "a CAN frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_cycle) == 8, "a CAN frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_rise) == 8, "a CAN frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_cycle_crc) == 8, "a CAN frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_health) == 8, "a CAN frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_canbus_lamp_node) == 8, "a CAN frame");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) + OLS_LOG_ENTRIES_MAX * sizeof(struct ols_trigger_log_entry) <=
                     OLS_PAYLOAD_BYTES_MAX,
                 "a full trigger log reply fits a frame");
+OLS_WIRE_ASSERT(sizeof(struct ols_digests_reply) + OLS_DIGESTS_MAX * sizeof(struct ols_cycle_digest) <=
+                    OLS_PAYLOAD_BYTES_MAX,
+                "a full digests reply fits a frame");
 
 #endif

@@ -100,7 +100,7 @@ def boards_json(boards):
     tables = {board['name']: {'title': board['title'], 'chainBits': board['shift']['chain_bits'],
                               'outputs': gpios({name: board['outputs'][name] for name in OUTPUTS}),
                               'stopInputs': gpios(board['stop_inputs']), 'inputs': gpios(board['inputs']),
-                              'can': gpios(board['can']['pins']) if 'can' in board else None}
+                              'can': {'spi': board['can']['spi'], 'pins': gpios(board['can']['pins'])} if 'can' in board else None}
               for board in boards}
     return json.dumps(tables, indent=2) + '\n'
 

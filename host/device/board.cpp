@@ -67,6 +67,10 @@ std::string fault_text(const ols_status_reply& status) {
         case OLS_FAULT_HEARTBEAT:
             text = "heartbeat: the host was silent for too long; check its load, or arm with a longer time";
             break;
+        case OLS_FAULT_OVER_DUTY:
+            text =
+                "over_duty: a light was longer than the program's longest; do not use this board before it is checked";
+            break;
     }
     const std::string slot =
         status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));
@@ -81,6 +85,7 @@ const char* state_name(uint8_t state) {
         case OLS_STATE_PLAYING: return "playing";
         case OLS_STATE_DONE: return "done";
         case OLS_STATE_FAULT: return "fault";
+        case OLS_STATE_WAITING: return "waiting";
         default: return "unknown";
     }
 }

@@ -2,6 +2,7 @@
 // Board links by their scheme.
 #include "device/transfer.hpp"
 
+#include "device/can_transfer.hpp"
 #include "device/usb_board.hpp"
 
 namespace ols {
@@ -22,7 +23,8 @@ Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link) {
     constexpr std::string_view socket_scheme = "socket:", usb_scheme = "usb:";
     if (link.starts_with(socket_scheme)) return open_socket_transfer(link.substr(socket_scheme.size()));
     if (link.starts_with(usb_scheme)) return open_usb_link(link.substr(usb_scheme.size()));
-    return fail("'" + link + "' is no board link: write usb:, usb:SERIAL or socket:PATH");
+    if (link.starts_with("can:") || link.starts_with("can-socket:")) return open_can(link);
+    return fail("'" + link + "' is no board link: write usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH");
 }
 
 }  // namespace ols

@@ -26,7 +26,8 @@ class Transfer {
 };
 
 // "usb:" is the one board that is plugged in, "usb:SERIAL" the one of that serial number, "socket:PATH" the emulated
-// board's USB. Errors say what links there are, which boards are plugged in, or how to get permission.
+// board's USB, "can:IFACE" a SocketCAN interface, "can-socket:PATH" the emulated CAN bus ("#N" behind these two: board N,
+// not 0). Errors say what links there are, which boards are plugged in, or how to get permission.
 Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link);
 
 // The emulated board's USB over the AF_UNIX socket at `path` (docs/architecture.md, "USB transfers over a socket").

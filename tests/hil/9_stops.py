@@ -116,7 +116,7 @@ def test_a_stop_as_short_as_a_tick_is_enough(emulated):
     assert wire.FAULTS[status["fault"]] == "emergency stop"
 
 
-def test_a_silent_host_is_noticed_within_two_milliseconds_of_the_time_chosen(emulated):
+def test_a_silent_host_is_noticed_at_the_time_chosen(emulated):
     board = emulated(trace=True)
     link = board.plug()
     heartbeat = 30 * MS
@@ -132,7 +132,8 @@ def test_a_silent_host_is_noticed_within_two_milliseconds_of_the_time_chosen(emu
     changes = check_trace.read_vcd(board.trace)
     rises = [tick for tick, name, level in changes if name == "TRIG0" and level]
     last = max(tick for tick, name, _ in changes if name in LIT)
-    assert heartbeat <= status["fault_ticks"] - heard["now_ticks"] <= heartbeat + 2 * MS
+    # The board heard the last message some microseconds before it read its time for the answer.
+    assert -MS // 50 <= status["fault_ticks"] - heard["now_ticks"] - heartbeat <= MS // 1000
     assert last - rises[0] <= status["fault_ticks"] + MS // 100  # dark within 10 us of noticing
 
 

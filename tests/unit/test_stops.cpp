@@ -64,8 +64,10 @@ TEST_F(Stops, each_stop_input_is_a_fault_of_its_own_while_armed_and_while_playin
         board_host_run_us(5'000);
         board_host_pull_stop_input(input, true);
         board_host_pull_stop_input(input, false);
+        EXPECT_FALSE(board_host_pins_are_connected()) << "at once";
         board_host_run_us(1'000);
-        EXPECT_EQ(status().fault_slot, 6'000 * 125 / 57'870);
+        EXPECT_EQ(status().fault_slot, 5'000 * 125 / 57'870) << "the last before it was dark";
+        EXPECT_EQ(status().fault_ticks, 5'000 * 125u);
         expect_fault(causes[input]);
         ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
         ASSERT_TRUE(arm().ok(OLS_ARM));
@@ -98,6 +100,59 @@ TEST_F(Stops, a_silent_host_is_a_fault_only_with_a_heartbeat_and_any_message_is_
     play();
     board_host_run_us(60'000'000);
     EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+}
+
+TEST_F(Stops, a_light_longer_than_any_of_the_programs_is_a_fault_while_it_plays) {
+    play();
+    board_host_run_us(5'000);
+    board_host_hold_light(50'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING) << "as long as the longest";
+    board_host_hold_light(50'001);
+    EXPECT_FALSE(board_host_pins_are_connected());
+    EXPECT_EQ(status().fault_slot, 5'000 * 125 / 57'870);
+    expect_fault(OLS_FAULT_OVER_DUTY);
+}
+
+TEST_F(Stops, the_longest_light_is_that_of_both_programs_during_a_swap_and_then_of_the_new_one) {
+    Bytes longer = program(18), shorter = program(18);
+    for (size_t n = 0; n < 18; n++) {
+        const uint32_t long_ticks = 51'000, short_ticks = 49'000;
+        memcpy(&longer[n * 16 + 4], &long_ticks, 4);
+        memcpy(&shorter[n * 16 + 4], &short_ticks, 4);
+    }
+    play();
+    ASSERT_TRUE(load(longer, 0).ok(OLS_LOAD_END));
+    board_host_hold_light(50'000);
+    ASSERT_TRUE(ask(OLS_SWAP).ok(OLS_SWAP));
+    board_host_hold_light(51'000);
+    board_host_run_us(30'000);
+    ASSERT_EQ(status().next, OLS_NEXT_NONE) << "swapped";
+    board_host_hold_light(51'000);
+    ASSERT_TRUE(load(shorter, 0).ok(OLS_LOAD_END));
+    ASSERT_TRUE(ask(OLS_SWAP).ok(OLS_SWAP));
+    board_host_hold_light(51'000);
+    board_host_run_us(30'000);
+    ASSERT_EQ(status().next, OLS_NEXT_NONE) << "swapped";
+    EXPECT_TRUE(board_host_pins_are_connected());
+    board_host_hold_light(49'001);
+    expect_fault(OLS_FAULT_OVER_DUTY);
+}
+
+TEST_F(Stops, a_program_that_changes_in_memory_while_it_plays_is_a_fault_within_one_reading_of_it) {
+    play();
+    board_host_run_us(5'000);
+    board_host_corrupt_program();
+    board_host_run_us(2 * 1'000 * (18 * (16 + 24 + 16) / 256 + 2));
+    expect_fault(OLS_FAULT_BAD_MEMORY);
+}
+
+TEST_F(Stops, a_stop_command_that_comes_after_a_stop_input_does_not_hide_the_fault) {
+    play();
+    board_host_run_us(5'000);
+    board_host_pull_stop_input(0, true);
+    board_host_pull_stop_input(0, false);
+    ask(OLS_STOP);
+    expect_fault(OLS_FAULT_EMERGENCY_STOP);
 }
 
 TEST_F(Stops, a_program_that_lights_a_lamp_for_too_much_of_the_cycle_is_refused) {

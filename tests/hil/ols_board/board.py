@@ -10,11 +10,13 @@ import tempfile
 import time
 
 from ols_board import wire
+from ols_board.can import Can, EmulatedBus, SocketCanBus
 from ols_board.usb import OK, Usb
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 IMAGE = pathlib.Path(os.environ.get("IMAGE", ROOT / "build/firmware/stage.elf"))
 EMULATOR = ROOT / "tools/stagesim/board/board.mjs"
+BOARD = os.environ.get("BOARD", "emulated")
 
 
 class BoardError(Exception):
@@ -26,13 +28,15 @@ class BoardError(Exception):
 class EmulatedBoard:
     """board.mjs as a child process, with its trace, its exposures and its log."""
 
-    def __init__(self, *arguments, trace=False, exposures=False, image=IMAGE):
+    def __init__(self, *arguments, trace=False, exposures=False, image=IMAGE, can=BOARD.startswith("can:")):
+        self.can = can
         self.directory = tempfile.TemporaryDirectory(prefix="ols")
         self.path = pathlib.Path(self.directory.name)
         self.trace = self.path / "trace.vcd" if trace else None
         self.listener = self._listen() if exposures else None
         command = ["node", EMULATOR, "--image", image, "--usb", self.path / "board.sock", "--stats", *arguments]
         command += ["--vcd", self.trace] if trace else []
+        command += ["--can", self.path / "can.sock"] if can else []
         command += ["--exposures", self.path / "stage.sock"] if exposures else []
         self.process = subprocess.Popen([str(part) for part in command], stderr=subprocess.PIPE, text=True)
         self.stage = self.listener.accept()[0].makefile() if exposures else None
@@ -45,10 +49,24 @@ class EmulatedBoard:
         return listener
 
     def plug(self):
-        """Connects the cable, waiting for the board's socket to be there."""
+        """Connects the cable that BOARD asks for."""
+        return self.plug_can() if BOARD.startswith("can:") else self.plug_usb()
+
+    def plug_usb(self):
+        return self._connect(lambda: Link(Usb(self.path / "board.sock")))
+
+    def plug_can(self):
+        return Link(Can(self.bus()))
+
+    def bus(self):
+        """One more node on the board's CAN bus."""
+        return self._connect(lambda: EmulatedBus(self.path / "can.sock"))
+
+    def _connect(self, connect):
+        """Waits for the board's sockets to be there."""
         for _ in range(500):
             try:
-                return Link(Usb(self.path / "board.sock"))
+                return connect()
             except (FileNotFoundError, ConnectionRefusedError):
                 assert self.process.poll() is None, self.process.stderr.read()
                 time.sleep(0.02)
@@ -82,6 +100,19 @@ class EmulatedBoard:
             self.process.kill()
             self.process.communicate()
         self.directory.cleanup()
+
+
+class CanBoard:
+    """A board at a CAN interface of this machine, BOARD=can:IFACE."""
+
+    def __init__(self, interface):
+        self.interface = interface
+
+    def plug(self):
+        return Link(Can(SocketCanBus(self.interface)))
+
+    def __exit__(self, *_):
+        pass
 
 
 class Link:
@@ -151,6 +182,15 @@ class Link:
             if status["state"] in states:
                 return status
         raise TimeoutError(f"the board stays in state {status['state']}")
+
+    def digests(self, first=0):
+        """The digests of cycles from number `first` on, as dictionaries, and how many are lost."""
+        names = ("first_rise_ticks", "last_rise_ticks", "first_counter", "cycle", "entries_crc32", "trigger_count",
+                 "program", "flags")
+        reply = self.ask(wire.READ_DIGESTS, first.to_bytes(4, "little") + (31).to_bytes(2, "little") + b"\0\0")
+        _, _, lost, count, _ = wire.DIGESTS_REPLY.unpack_from(reply)
+        return [dict(zip(names, wire.DIGEST.unpack_from(reply, wire.DIGESTS_REPLY.size + n * wire.DIGEST.size)))
+                for n in range(count)], lost
 
     def trigger_log(self, first=0):
         """All entries from counter `first` on that the board has now, and how many it has lost."""

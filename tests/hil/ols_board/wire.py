@@ -13,7 +13,7 @@ BASIS, TRACKING, MATTE, DARK = range(4)
 NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
 IDLE, LOADED, ARMED, PLAYING, DONE, FAULT, WAITING = range(7)
 FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory",
-          "emergency stop", "over-temperature", "open lamp", "heartbeat")
+          "emergency stop", "over-temperature", "open lamp", "heartbeat", "over-duty")
 ERROR_BAD_STATE, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 5, 7, 8, 9
 
 HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI16s")
@@ -23,6 +23,11 @@ STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
 SWAP_REPLY = struct.Struct("<IB3x")
 LOG_REPLY = struct.Struct("<IIIHH")
 LOG_ENTRY = struct.Struct("<QIIHBB")
+READ_DIGESTS = 0x0C
+DIGESTS_REPLY = struct.Struct("<IIIHH")
+DIGEST = struct.Struct("<QQIIIHBB")
+DIGEST_INCOMPLETE = 1
+SPEAKS_CAN, KEEPS_DIGESTS = 32, 64  # capabilities
 ERROR_REPLY = struct.Struct("<HH116s")
 LOAD_BEGIN_REQUEST = struct.Struct("<HHIIII")
 TRIGGER = struct.Struct("<iIBBH")

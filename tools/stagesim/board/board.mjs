@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 // The emulated board: runs the firmware image on an RP2040 model and connects it to a host and a virtual stage.
 import { Board } from './board_model.mjs';
+import { CanBus } from './can_bus.mjs';
+import { CanSocket } from './can_socket.mjs';
 import { ExposureRecorder } from './exposures.mjs';
 import { ExposureSocket } from './exposure_socket.mjs';
 import { readImage } from './image.mjs';
@@ -27,7 +29,9 @@ async function main() {
   const recorder = stage
     ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), pins, options.activeLow) : null;
 
+  const canBus = options.can ? new CanBus(options.canBitRate) : null;
   const board = new Board(image, {
+    canBus,
     pins,
     naive: options.naive,
     seed: options.seed,
@@ -44,7 +48,8 @@ async function main() {
     },
     onUnplug: () => usb?.drop(),
   });
-  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage,
+  const can = canBus ? new CanSocket(options.can, canBus, { onActivity: () => pacer.wake(), log }) : null;
+  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage, can,
                                    openSince: () => recorder?.openSince ?? Infinity });
   const usb = options.usb ? new UsbSocket(options.usb, {
     host: () => board.usbHost,
@@ -53,15 +58,20 @@ async function main() {
     log,
   }) : null;
   await usb?.listen();
+  await can?.listen();
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });
   for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => pacer.stop());
   await pacer.run();
 
   usb?.close();
+  can?.close();
   vcd?.close(board.tick);
   await stage?.end();
-  if (options.stats) process.stderr.write(`${JSON.stringify({ ...pacer.statistics, dropped: stage?.dropped ?? 0 })}\n`);
+  if (options.stats) {
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0 };
+    process.stderr.write(`${JSON.stringify(statistics)}\n`);
+  }
 }
 
 function boardOf(image) {

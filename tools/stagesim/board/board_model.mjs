@@ -2,8 +2,10 @@
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
 import { startsUsbBoot } from './boot_rom.mjs';
+import { CanBoard } from './can_board.mjs';
 import { buildChip, onceLogger } from './chip.mjs';
 import { boot } from './image.mjs';
+import { hangProgram } from './processor.mjs';
 import { Cause, watchdogLegacy } from './system.mjs';
 import { UsbHost } from './usb_host.mjs';
 
@@ -21,6 +23,7 @@ export class Board {
   #triggerMask;
   #injections;
   #resetCause = null; // of a reset that is due
+  #can = null;
   #inputs; // levels from outside, by GPIO
 
   /**
@@ -31,6 +34,7 @@ export class Board {
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
+   * @param {import('./can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
    * @param {(cause: string) => void} options.onReset
@@ -43,6 +47,11 @@ export class Board {
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = [...options.injections];
     this.#logger = onceLogger(options.log);
+    if (options.canBus) {
+      if (options.pins.can === null) throw new Error(`board "${options.pins.name}" has no CAN controller`);
+      const drive = (gpio, level) => this.drive(gpio, level);
+      this.#can = new CanBoard(options.canBus, options.pins.can, { drive, log: (text) => this.#logger.warn('board', text) });
+    }
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
   }
 
@@ -58,14 +67,25 @@ export class Board {
     return this.#epoch + this.#parts.time.cycle;
   }
 
+  /** Since the chip's last reset. */
+  get cycle() {
+    return this.#parts.time.cycle;
+  }
+
   /** Cycles in which the processor was awake, since the last reset. */
   get awakeCycles() {
     return this.#parts.lockstep.awakeCycles;
   }
 
+  /** The longest times of handlers since the last reset, in cycles: by exception number, and of the program under PRIMASK. */
+  get handlerTimes() {
+    const { handlers, longestHeld } = this.#parts.lockstep.handlerTimes;
+    return { handlers: Object.fromEntries(handlers), held: longestHeld };
+  }
+
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
   get quiet() {
-    return this.#parts.lockstep.quiet && !this.usbHost.active;
+    return this.#parts.lockstep.quiet && !this.usbHost.active && !this.#can?.bus.busy;
   }
 
   get nextAlarmTick() {
@@ -97,10 +117,17 @@ export class Board {
     this.#options.onReset(cause);
   }
 
-  /** The processor stops for good, as if the program had gone astray; the rest of the chip goes on. */
+  /** The main program never goes on, as if it had gone astray; handlers run, and so does the rest of the chip. */
   hang() {
-    this.chip.core.enabledInterrupts = 0;
-    this.chip.core.waiting = true;
+    const { core } = this.chip;
+    while (core.IPSR !== 0) this.#parts.lockstep.run(this.#parts.time.cycle + 1);
+    hangProgram(this.chip);
+  }
+
+  /** The processor stops for good, in a handler that never ends; the rest of the chip goes on. */
+  lockUp() {
+    hangProgram(this.chip);
+    this.chip.core.PM = true;
   }
 
   /** Drives an input of the board from outside, until it is driven otherwise. */
@@ -122,9 +149,13 @@ export class Board {
     };
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
     this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
-    this.#parts.pads.onChange = (cycle, levels, driven) => this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
+    this.#parts.pads.onChange = (cycle, levels, driven) => {
+      this.#can?.pinsChanged(levels, driven);
+      this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
+    };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
+    this.#can?.attach(this.chip);
     if (startsUsbBoot(scratch)) {
       // Cleared by the boot ROM as it jumps. The loader's own USB device is not modelled: nobody answers.
       this.chip.writeUint32(WATCHDOG_SCRATCH4, 0);

@@ -13,11 +13,10 @@ const CYCLE_NS = 8;
  */
 export function correctDma(chip) {
   const { dma } = chip;
-  dma.starved = false;
-
   for (const channel of dma.channels) {
+    channel.starved = false;
     channel.scheduleTransfer = () => {
-      if (dma.starved) return;
+      if (channel.starved) return;
       const requested = channel.treqValue === TREQ_PERMANENT || dma.dreq[channel.treqValue];
       const cycles = requested ? 1 : timerCycles(dma, channel.treqValue);
       if (cycles > 0) channel.transferAlarm.schedule(cycles * CYCLE_NS);
@@ -29,10 +28,12 @@ export function correctDma(chip) {
   dma.readUint32 = (offset) => (offset === CHAN_ABORT ? 0 : read.call(dma, offset));
 }
 
-/** Stops all transfers, as a bus that is never granted would. */
-export function starveDma(chip) {
-  chip.dma.starved = true;
-  for (const channel of chip.dma.channels) channel.transferAlarm.cancel();
+/** Stops one channel's transfers, or all, as a bus that is never granted would. */
+export function starveDma(chip, number = null) {
+  for (const channel of number === null ? chip.dma.channels : [chip.dma.channels[number]]) {
+    channel.starved = true;
+    channel.transferAlarm.cancel();
+  }
 }
 
 /** Cycles between requests of pacing timer TREQ 59..62: Y / X (datasheet 2.5.3.2); 0 if it does not run. */

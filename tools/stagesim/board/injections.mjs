@@ -4,14 +4,19 @@ import { starveDma } from './dma.mjs';
 import { raiseHardFault } from './processor.mjs';
 import { Cause } from './system.mjs';
 
-/** What each fault does to a Board. */
+/** What each fault does to a Board, with the numbers given after its name. */
 const FAULTS = {
   reset: (board) => board.reset(Cause.RUN_PIN),
   watchdog: (board) => board.reset(Cause.WATCHDOG),
   hang: (board) => board.hang(),
+  lockup: (board) => board.lockUp(),
   hardfault: (board) => raiseHardFault(board.chip),
-  starve: (board) => starveDma(board.chip),
+  starve: (board, channel) => starveDma(board.chip, channel),
+  upset: (board, bit) => board.chip.pio[0].machines[0].upset(bit, board.cycle),
+  flip: (board, address, bit) => board.chip.writeUint8(address, board.chip.readUint8(address) ^ (1 << bit)),
   unplug: (board) => board.unplug(),
+  suspend: (board) => board.usbHost.suspend(),
+  busreset: (board) => board.usbHost.resetBus(),
   estop: (board) => board.drive(board.pins.stopInputs.ESTOP, false),
   overtemperature: (board) => board.drive(board.pins.stopInputs.OVER_TEMPERATURE, false),
   openlamp: (board) => board.drive(board.pins.stopInputs.OPEN_LAMP, false),
@@ -19,16 +24,25 @@ const FAULTS = {
   genlockfall: (board) => board.drive(board.pins.genlock, false),
   release: (board) => Object.values(board.pins.stopInputs).forEach((gpio) => board.drive(gpio, true)),
 };
+/** How many numbers a fault takes, at least and at most, and what each must be below; none where it is not here. */
+const NUMBERS = { starve: { least: 0, below: [12] }, upset: { least: 1, below: [32] },
+                  flip: { least: 2, below: [0x20042000, 8] } };
 
 /**
- * @param {string} text FAULT@TICK or FAULT@trigger:N
+ * @param {string} text FAULT[:NUMBER...]@TICK or FAULT[:NUMBER...]@trigger:N
  * @returns {{name: string, inject: (board: object) => void, tick: number, trigger: number}} the unused one Infinity
  */
 export function parseInjection(text) {
-  const match = /^([a-z]+)@(?:(\d+)|trigger:(\d+))$/.exec(text);
+  const match = /^([a-z]+)((?::(?:0x[0-9a-f]+|\d+))*)@(?:(\d+)|trigger:(\d+))$/.exec(text);
   if (!match || !FAULTS[match[1]]) {
     throw new Error(`--inject ${text}: write FAULT@TICK or FAULT@trigger:N with one of ${Object.keys(FAULTS).join(', ')}`);
   }
-  return { name: match[1], inject: FAULTS[match[1]], tick: match[2] ? Number(match[2]) : Infinity,
-           trigger: match[3] ? Number(match[3]) : Infinity };
+  const [, name, list, tick, trigger] = match;
+  const numbers = list.split(':').slice(1).map(Number);
+  const { least, below } = NUMBERS[name] ?? { least: 0, below: [] };
+  if (numbers.length < least || numbers.length > below.length || numbers.some((number, n) => number >= below[n])) {
+    throw new Error(`--inject ${text}: ${name} takes ${below.length} numbers, below ${below.join(' and ') || 'nothing'}`);
+  }
+  return { name, inject: (board) => FAULTS[name](board, ...numbers), tick: tick ? Number(tick) : Infinity,
+           trigger: trigger ? Number(trigger) : Infinity };
 }

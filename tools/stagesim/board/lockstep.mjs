@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Time itself: processor, PIO, DMA and timers advance together, cycle by cycle, and where nothing can happen time
 // jumps to the next cycle in which something does.
+import { HandlerTimes } from './handler_times.mjs';
 import { runInstruction } from './processor.mjs';
 
 const CYCLE_NS = 8;
@@ -29,6 +30,7 @@ export class Lockstep {
     this.#naive = naive;
     /** Cycles in which the processor was not asleep. */
     this.awakeCycles = 0;
+    this.handlerTimes = new HandlerTimes(chip.core);
     correctClock(chip.clock);
   }
 
@@ -48,6 +50,7 @@ export class Lockstep {
       } else {
         const cycles = runInstruction(core);
         this.awakeCycles += cycles;
+        this.handlerTimes.pass(cycles);
         this.#advance(time.cycle + cycles, false);
       }
     }

@@ -10,6 +10,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --image FILE        firmware, .elf or .uf2
   --board NAME        whose pins to connect: pico or feather_can (default: the board that the image says it is for)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
+  --can SOCKET        fit a CAN controller, and listen there for nodes of its bus ("CAN frames over a socket")
+  --can-kbit-s N      the bus's bit rate (default 1000)
   --exposures SOCKET  connect there and send every exposure as a JSON line
   --vcd FILE          write the board's signals as a value change dump
   --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
@@ -20,9 +22,11 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --cycles-limit N    end after N ticks of 8 ns
   --seed N            of the chip's random bits (default 1)
   --board-id HEX      the flash chip's unique number, 16 digits
-  --inject FAULT@WHEN one of reset, watchdog, hang, hardfault, starve, unplug; estop, overtemperature, openlamp
-                      pull that input low, release lets all go high; genlock and genlockfall are edges of that
-                      input; WHEN is a tick, or trigger:N for the N-th rise of any trigger; may be given several times
+  --inject FAULT@WHEN WHEN is a tick, or trigger:N for the N-th rise of any trigger; may be given several times.
+                      reset, watchdog, hardfault; hang: the main program stops, lockup: handlers, too; starve: DMA,
+                      or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
+                      suspend and busreset of USB; estop, overtemperature, openlamp pull that input low, release
+                      lets all go high; genlock and genlockfall are edges of that input
   --stats             print ticks, speed and dropped lines as JSON at the end
   --help
 
@@ -38,7 +42,7 @@ export function parseOptions(args) {
     ({ values } = parseArgs({
       args,
       options: {
-        image: text, board: text, usb: text, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
+        image: text, board: text, usb: text, can: text, 'can-kbit-s': { ...text, default: '1000' }, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
@@ -56,6 +60,7 @@ export function parseOptions(args) {
   return {
     ...values,
     chainBits,
+    canBitRate: 1000 * integer('--can-kbit-s', values['can-kbit-s'], 1),
     seed: integer('--seed', values.seed, 0),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
     activeLow: values['active-low'].map((text) => trigger(text)),

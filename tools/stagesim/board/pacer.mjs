@@ -5,6 +5,7 @@ import { setTimeout as sleep } from 'node:timers/promises';
 
 const TICKS_PER_MS = 125_000;
 const SLICE_TICKS = TICKS_PER_MS; // also the longest gap between "now" lines
+const CAN_SLICE_TICKS = SLICE_TICKS / 8; // a node of the bus answers within a frame or two
 const SETTLE_TICKS = 8 * TICKS_PER_MS; // quiet for so long, or nothing more happens: a suspend needs 3 ms
 const GRANT_TICKS = 50 * TICKS_PER_MS; // for a request to be answered: the firmware looks every millisecond
 const FOREVER_MS = 0x7fffffff; // the longest timer there is
@@ -24,6 +25,7 @@ export class Pacer {
   #pace;
   #limit;
   #stage;
+  #can;
   #stopped = false;
   #wake = () => {};
   #woken = false;
@@ -37,15 +39,16 @@ export class Pacer {
   #openSince;
 
   /**
-   * @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null, openSince?: () => number}} options
+   * @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null, can?: object | null, openSince?: () => number}} options
    *   openSince: the tick at which the oldest exposure still under way began, Infinity when none is
    */
-  constructor(board, { pace, ticksLimit, stage, openSince = () => Infinity }) {
+  constructor(board, { pace, ticksLimit, stage, can = null, openSince = () => Infinity }) {
     this.#openSince = openSince;
     this.#board = board;
     this.#pace = pace;
     this.#limit = ticksLimit;
     this.#stage = stage;
+    this.#can = can;
     this.#startTick = board.tick;
     if (stage) stage.onReady = () => this.#resume();
   }
@@ -87,7 +90,12 @@ export class Pacer {
 
   get #heldBack() {
     if (this.#pace === 'wall' || this.#stopped || !this.#stage?.full) return false;
-    return !this.#board.usbHost.pending || this.#board.tick >= this.#grantedUntil;
+    return !this.#isAwaited || this.#board.tick >= this.#grantedUntil;
+  }
+
+  /** Somebody may be waiting for the board's time to pass. */
+  get #isAwaited() {
+    return this.#board.usbHost.pending || (this.#can?.hasClients ?? false);
   }
 
   #slice() {
@@ -95,10 +103,12 @@ export class Pacer {
     const from = board.tick;
     const awake = board.awakeCycles;
     const begin = process.hrtime.bigint();
-    board.run(Math.min(from + SLICE_TICKS, this.#limit));
+    const length = this.#can?.hasClients && this.#quietSince === null ? CAN_SLICE_TICKS : SLICE_TICKS;
+    board.run(Math.min(from + length, this.#limit));
     this.#running_ns += process.hrtime.bigint() - begin;
+    this.#can?.tell(board.tick);
     this.#stage?.send({ type: 'now', tick: Math.min(board.tick, this.#openSince()) });
-    const busy = !board.quiet || board.awakeCycles < awake || board.awakeCycles - awake > AWAKE_FRACTION * SLICE_TICKS;
+    const busy = !board.quiet || board.awakeCycles < awake || board.awakeCycles - awake > AWAKE_FRACTION * length;
     if (busy) this.#quietSince = null;
     else this.#quietSince ??= from;
   }
@@ -106,7 +116,7 @@ export class Pacer {
   /** Lets sockets be served, and sleeps as long as there is nothing to do. */
   async #rest() {
     const settled = this.#quietSince !== null && this.#board.tick - this.#quietSince >= SETTLE_TICKS;
-    if (settled && this.#board.usbHost.pending) await this.#sleep(SLICE_TICKS / TICKS_PER_MS);
+    if (settled && this.#isAwaited) await this.#sleep(SLICE_TICKS / TICKS_PER_MS);
     else if (settled && this.#limit === Infinity) await this.#sleep(FOREVER_MS);
     else await new Promise(setImmediate); // also to reach a limit of ticks
   }

@@ -12,6 +12,7 @@ const BOARDS = JSON.parse(readFileSync(new URL('boards.json', import.meta.url), 
  * @property {number} genlock the input whose rise can start play
  * @property {number[]} triggers GPIOs of TRIG0 to TRIG3
  * @property {number} mask bit n: GPIO n is an output
+ * @property {{spi: number, pins: Record<string, number>} | null} can the CAN controller's SPI block and GPIOs
  */
 
 /**
@@ -23,7 +24,7 @@ export function boardPins(name) {
   if (board === null) throw new Error(`no board "${name}"; there are: ${Object.keys(BOARDS).join(', ')}`);
   const { outputs, stopInputs, inputs } = board;
   return Object.freeze({
-    name, outputs, stopInputs, genlock: inputs.GENLOCK,
+    name, outputs, stopInputs, genlock: inputs.GENLOCK, can: board.can,
     triggers: [outputs.TRIG0, outputs.TRIG1, outputs.TRIG2, outputs.TRIG3],
     mask: Object.values(outputs).reduce((mask, gpio) => mask | (1 << gpio), 0),
   });

@@ -82,7 +82,8 @@ export class Pio extends BasePeripheral {
     return this.machines.every((machine) => machine.quiet);
   }
 
-  #reschedule() {
+  /** Call after anything but a step has changed when a machine acts next. */
+  reschedule() {
     let due = NEVER;
     for (const machine of this.machines) due = Math.min(due, machine.due, machine.refillDue);
     this.due = due;
@@ -128,7 +129,7 @@ export class Pio extends BasePeripheral {
     this.flagsToSet = 0;
     this.flagsToClear = 0;
     for (const machine of this.machines) machine.wake(Stall.IRQ, visibleCycle);
-    this.#reschedule();
+    this.reschedule();
     this.updateInterrupts();
   }
 
@@ -256,7 +257,7 @@ export class Pio extends BasePeripheral {
     } else {
       this.#writeGlobal(offset, value, cycle);
     }
-    this.#reschedule();
+    this.reschedule();
     this.updateInterrupts();
     if (this.pinsChanged) this.pads.update(cycle + 1);
   }
@@ -336,14 +337,14 @@ export class Pio extends BasePeripheral {
     }
     const word = machine.rx.pull();
     machine.wake(Stall.RX, this.time.cycle);
-    this.#reschedule();
+    this.reschedule();
     this.rxChanged(machine);
     return word;
   }
 
   #readMachine(machine, place) {
     machine.settle(this.time.cycle);
-    this.#reschedule();
+    this.reschedule();
     switch (place) {
       case 0x00:
         return machine.clock.register;

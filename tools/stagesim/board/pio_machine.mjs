@@ -56,6 +56,13 @@ export class PioMachine {
     this.setPinCtrl(0x5 << 26);
   }
 
+  /** A bit of X flips in `cycle`, as radiation flips one. */
+  upset(bit, cycle) {
+    this.settle(cycle);
+    this.x = (this.x ^ (1 << bit)) >>> 0;
+    this.block.reschedule();
+  }
+
   // Registers
 
   setExecCtrl(value) {

@@ -49,6 +49,16 @@ export function raiseHardFault(chip) {
   chip.core.PC &= ~1;
 }
 
+/** Lets the program go on at a branch to itself, which is put where no program is: the stack's far end. */
+export function hangProgram(chip) {
+  const STACK_END = 0x20041000; // of the last SRAM bank (RP2040 datasheet 2.6.2)
+  const BRANCH_TO_SELF = 0xe7fe;
+  chip.writeUint16(STACK_END, BRANCH_TO_SELF);
+  chip.core.PC = STACK_END;
+  chip.core.PM = false;
+  chip.core.waiting = false;
+}
+
 /** Whether an exception is pending that would end a WFI: PRIMASK does not matter (ARMv6-M B1.5.19). */
 function wakePending(core) {
   return (core.pendingInterrupts & core.enabledInterrupts) !== 0 || core.pendingNMI || core.pendingSystick ||

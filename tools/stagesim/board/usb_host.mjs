@@ -88,6 +88,18 @@ export class UsbHost {
     this.#suspendAlarm.schedule(SUSPEND_NS);
   }
 
+  /** Resets the bus and configures the device anew, as a host does that has lost patience with it. */
+  resetBus() {
+    this.#lose('resetting');
+    this.#after(RESET_NS, () => this.#endReset());
+  }
+
+  /** Sends no more frames: the device sees an idle bus. */
+  suspend() {
+    this.#lose('failed');
+    this.#suspendAlarm.schedule(SUSPEND_NS);
+  }
+
   /**
    * @param {{type: 'control' | 'bulk', endpoint: number, setup?: Uint8Array, data?: Uint8Array, capacity?: number,
    *          timeout_us: number, done: (status: number, bytes: Uint8Array) => void}} request

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// Light watch: PIO block 1 measures every light at LIGHT_EN's pad. One that is longer than allowed is the fault
+// OLS_FAULT_OVER_DUTY: what was loaded kept the limits, so something between its words and the pad has failed.
+#ifndef OLS_LIGHT_WATCH_H
+#define OLS_LIGHT_WATCH_H
+
+#include <stdint.h>
+
+// Loads the PIO program. Once, after witness_init, behind whose program it lies.
+void light_watch_init(void);
+
+// From now on no light may be longer; until the next call. While pins are dark.
+void light_watch_arm(uint32_t longest_ticks);
+
+// From the next light on, this is the longest. While a program plays.
+void light_watch_allow(uint32_t longest_ticks);
+
+#endif

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// SocketCAN: raw frames of an interface of this machine (Linux, Documentation/networking/can.rst). ISO-TP is our own
+// above it, the one that the board has: the kernel's CAN_ISOTP is not in every kernel and would be a second one to trust.
+#include <fmt/format.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+
+#include "device/can_bus.hpp"
+
+namespace ols {
+
+namespace {
+
+class SocketCan : public CanBus {
+  public:
+    SocketCan(int fd, std::string interface) : fd_(fd), interface_(std::move(interface)) {}
+    ~SocketCan() override { ::close(fd_); }
+
+    Status send(const can_frame& frame) override {
+        for (const uint64_t begin_us = now_us();;) {
+            if (::write(fd_, &frame, sizeof frame) == ssize_t(sizeof frame)) return Done{};
+            if (errno == EINTR) continue;
+            // A full queue is not an error that poll() could wait for: the kernel drops instead (can.rst, 4.1.7).
+            if (errno != ENOBUFS) return lost();
+            if (now_us() - begin_us > queue_timeout_us)
+                return fail("the CAN bus '" + interface_ +
+                            "' takes no frames: is the board on, the bus terminated, the bit rate the board's?");
+            ::usleep(queue_retry_us);
+        }
+    }
+
+    Result<std::optional<can_frame>> receive(uint64_t until_us) override {
+        for (;;) {
+            const uint64_t now = now_us();
+            pollfd ready{fd_, POLLIN, 0};
+            const int wait_ms = until_us <= now ? 0 : int(std::min<uint64_t>((until_us - now + 999) / 1000, 1000));
+            if (::poll(&ready, 1, wait_ms) < 0 && errno != EINTR) return lost();
+            can_frame frame{};
+            const ssize_t got = ::recv(fd_, &frame, sizeof frame, MSG_DONTWAIT);
+            if (got == ssize_t(sizeof frame)) return std::optional(frame);
+            if (got < 0 && errno != EAGAIN && errno != EINTR) return lost();
+            if (now_us() >= until_us) return std::optional<can_frame>();
+        }
+    }
+
+    uint64_t now_us() const override {
+        const auto now = std::chrono::steady_clock::now().time_since_epoch();
+        return uint64_t(std::chrono::duration_cast<std::chrono::microseconds>(now).count());
+    }
+
+  private:
+    static constexpr uint64_t queue_timeout_us = 1'000'000;
+    static constexpr useconds_t queue_retry_us = 200;  // a frame or two
+
+    Error lost() const {
+        return fail(fmt::format("the CAN interface '{}' is down ({}): sudo ip link set {} up type can bitrate 1000000",
+                                interface_, std::strerror(errno), interface_));
+    }
+
+    int fd_;
+    std::string interface_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id) {
+    ifreq request{};
+    if (interface.empty() || interface.size() >= sizeof request.ifr_name)
+        return fail("'" + interface + "' is no name of a network interface: see `ip link`");
+    std::memcpy(request.ifr_name, interface.c_str(), interface.size());
+    const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+    if (fd < 0) return fail(fmt::format("this kernel has no CAN ({}): modprobe can_raw", std::strerror(errno)));
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    const can_filter only{id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    const bool found = ::ioctl(fd, SIOCGIFINDEX, &request) == 0;
+    address.can_ifindex = request.ifr_ifindex;
+    if (!found || ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &only, sizeof only) != 0 ||
+        ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        const int error = errno;
+        ::close(fd);
+        return fail(fmt::format("no CAN interface '{}' ({}): see `ip link`, then sudo ip link set {} up type can bitrate "
+                                "1000000",
+                                interface, std::strerror(error), interface));
+    }
+    return std::unique_ptr<CanBus>(std::make_unique<SocketCan>(fd, interface));
+}
+
+}  // namespace ols
