@@ -94,13 +94,22 @@ class Link:
 
     def ask(self, message_type, payload=b""):
         """Sends a request and returns the reply's payload. Raises BoardError for an error reply."""
-        self.request_id = (self.request_id + 1) & 0xFFFF
-        status = self.usb.write(wire.frame(message_type, self.request_id, payload))
+        return self.ask_many(message_type, [payload])[0]
+
+    def ask_many(self, message_type, payloads):
+        """Sends several requests in one transfer, without waiting for the reply of each; returns their replies."""
+        first_id = self.request_id + 1
+        requests = [wire.frame(message_type, first_id + n & 0xFFFF, payload) for n, payload in enumerate(payloads)]
+        self.request_id = first_id + len(payloads) - 1 & 0xFFFF
+        status = self.usb.write(b"".join(requests))
         if status != OK:
             raise ConnectionError(f"transfer status {status}")
+        return [self._reply(message_type, first_id + n & 0xFFFF) for n in range(len(payloads))]
+
+    def _reply(self, message_type, request_id):
         while True:
             found = wire.take_frame(self.stream)
-            if found is not None and found[1] == self.request_id:
+            if found is not None and found[1] == request_id:
                 break
             status, data = self.usb.read()
             if status != OK:
