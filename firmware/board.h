@@ -16,9 +16,11 @@ enum {
     BOARD_PIN_TIMELINE = 4,  // the first of the timeline's eight: LATCH
     BOARD_PIN_LIGHT_EN = 5,
     BOARD_PIN_TRIG0 = 6,
+    BOARD_PIN_READY = 11,  // high while the timeline waits for an edge
     BOARD_PINS_END = 12,
     BOARD_PIN_STOP_INPUTS = 12,     // the first of BOARD_STOP_INPUTS, in the order of enum board_stop_input
     BOARD_PIN_GENLOCK = 15,         // its rise can start play
+    BOARD_PIN_PHOTO = 28,           // GENLOCK debounced, an output that PIO reads back
     BOARD_LIGHT_EN_ACTIVE_LOW = 0,  // 1: the pad is inverted and pulled up, for drivers with an OE input
     BOARD_CHAIN_BITS = 176,         // 11 drivers of 16 outputs: 156 lamps, 6 on the matte board, spares
     BOARD_SHIFT_DIVIDER = 1         // 17.9 MHz; 2 for drivers or wiring that need 8.9 MHz

@@ -33,7 +33,7 @@ void board_host_starve_shifter(void);
 void board_host_delay_triggers(uint32_t ticks);
 void board_host_corrupt_program(void);
 
-// A rise of GENLOCK.
+// A rise of GENLOCK that debouncing lets through.
 void board_host_genlock(void);
 
 // Pulls a stop input low (enum board_stop_input), or lets go of it.

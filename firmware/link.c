@@ -14,6 +14,8 @@
 #include "transport.h"
 #include "trigger_log.h"
 
+static const uint32_t capabilities =
+    OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP | OLS_CAN_START_BY_EDGE | OLS_CAN_GREY | OLS_CAN_CYCLE_BY_EDGE;
 static struct ols_frame_parser parser;
 static uint32_t session;
 static uint8_t reply_frame[OLS_FRAME_BYTES_MAX];
@@ -42,19 +44,19 @@ static void take_answer(enum stage_answer answer, struct reply* reply) {
 static void answer_hello(const struct ols_frame* request, struct reply* reply) {
     (void)request;  // its hash is for boards that could speak more than one layout
     struct ols_hello_reply* const hello = &reply->payload.hello;
-    *hello = (struct ols_hello_reply){
-        .layout_hash = OLS_LAYOUT_HASH,
-        .firmware_version = BOARD_FIRMWARE_VERSION,
-        .boot_nonce = board_boot_nonce(),
-        .tick_hz = BOARD_TICK_HZ,
-        .capabilities = OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP | OLS_CAN_START_BY_EDGE | OLS_CAN_GREY,
-        .chain_bits = BOARD_CHAIN_BITS,
-        .slots_max = OLS_SLOTS_MAX,
-        .shift_ticks = slot_shift_ticks(&board_sequence),
-        .slot_gap_ticks = slot_gap_ticks(),
-        .lamps_lit_max = board_sequence.limits.lamps_lit_max,
-        .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
-        .edge_start_ticks = TIMELINE_EDGE_START_TICKS};
+    *hello = (struct ols_hello_reply){.layout_hash = OLS_LAYOUT_HASH,
+                                      .firmware_version = BOARD_FIRMWARE_VERSION,
+                                      .boot_nonce = board_boot_nonce(),
+                                      .tick_hz = BOARD_TICK_HZ,
+                                      .capabilities = capabilities,
+                                      .chain_bits = BOARD_CHAIN_BITS,
+                                      .slots_max = OLS_SLOTS_MAX,
+                                      .shift_ticks = slot_shift_ticks(&board_sequence),
+                                      .slot_gap_ticks = slot_gap_ticks(),
+                                      .lamps_lit_max = board_sequence.limits.lamps_lit_max,
+                                      .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
+                                      .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
+                                      .cycle_edge_ticks = RECEPTOR_DELAY_TICKS + TIMELINE_EDGE_START_TICKS};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }

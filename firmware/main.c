@@ -4,6 +4,7 @@
 #include "fault.h"
 #include "link.h"
 #include "player.h"
+#include "receptor.h"
 #include "stage.h"
 #include "transport.h"
 #include "usb.h"
@@ -13,6 +14,7 @@ int main(void) {
     board_init();
     player_init();
     witness_init();
+    receptor_init();
     fault_init();
     stage_init();
     usb_init();

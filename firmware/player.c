@@ -35,6 +35,7 @@ static const struct cycle_feed shifter_feed = {{PIO0_BASE, 1}, DMA_REQUEST_PIO0_
                                                shifter_counts, shifter_tables};
 
 static const struct sequence* playing;
+static enum ols_start_source started_by;
 static uint32_t playing_from;        // cycle of the feeds, since arm, in which `playing` began
 static uint32_t begun;               // cycles begun by the feed that is ahead, since arm
 static const struct sequence* next;  // follows from cycle next_from on; null when no swap is under way
@@ -50,8 +51,6 @@ void player_init(void) {
 
     PIO_SM_CLKDIV(PIO0_BASE, timeline.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO0_BASE, timeline.machine) = PIO_EXEC_WRAP(TIMELINE_WRAP_TARGET, TIMELINE_WRAP);
-    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) = PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_IN(BOARD_PIN_GENLOCK);
-
     PIO_SM_CLKDIV(PIO0_BASE, shifter.machine) = PIO_CLKDIV(BOARD_SHIFT_DIVIDER);
     PIO_SM_EXECCTRL(PIO0_BASE, shifter.machine) =
         PIO_EXEC_WRAP(SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET, SHIFTER_ORIGIN + SHIFTER_WRAP) |
@@ -70,19 +69,13 @@ void player_init(void) {
     PIO_IRQ0_INTE(PIO0_BASE) = PIO_INTE_FLAG(0) | PIO_INTE_FLAG(1) | PIO_INTE_FLAG(2);
 }
 
-// Gives every cycle in first..end-1 to the sequence.
+// Gives every cycle in first..end-1 to the sequence; each ends with the wait for the next one's edge where it has one.
 static void set_cycles(const struct sequence* sequence, uint32_t first, uint32_t end) {
+    const uint32_t waits = started_by == OLS_START_EACH_CYCLE_BY_EDGE;
     for (uint32_t n = first; n != end; n++) {
-        cycle_feed_set(&timeline_feed, n, sequence_enter(sequence) + 1, sequence->cycle_words);
+        cycle_feed_set(&timeline_feed, n, sequence_enter(sequence) + 1, sequence->cycle_words + waits);
         cycle_feed_set(&shifter_feed, n, sequence_patterns(sequence), sequence_patterns_words(sequence));
     }
-}
-
-// Loads a scratch register through the FIFO; the machine must be stopped and its FIFO empty.
-static void set_scratch(struct pio_machine machine, uint32_t value, uint32_t mov_from_osr) {
-    PIO_TXF(machine.block, machine.machine) = value;
-    pio_execute(machine, PIO_PULL);
-    pio_execute(machine, mov_from_osr);
 }
 
 static bool send_first_pattern(void) {
@@ -101,14 +94,18 @@ static uint8_t inverted_triggers(const struct sequence* sequence) {
     return (uint8_t)inverted;
 }
 
-bool player_arm(const struct sequence* sequence, bool at_edge) {
+bool player_arm(const struct sequence* sequence, enum ols_start_source start) {
     player_stop();
+    const uint32_t edge_pin = start == OLS_START_EACH_CYCLE_BY_EDGE ? BOARD_PIN_PHOTO : BOARD_PIN_GENLOCK;
+    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) =
+        PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_SET(BOARD_PIN_READY, 1) | PIO_PINS_IN(edge_pin);
     playing = sequence;
+    started_by = start;
     playing_from = begun = 0;
     set_cycles(sequence, 0, CYCLE_FEED_RING);
-    set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
-    set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
-    pio_execute(timeline, PIO_JMP | (at_edge ? TIMELINE_GENLOCK : TIMELINE_NEXT));
+    pio_set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
+    pio_set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
+    pio_execute(timeline, PIO_JMP | (start == OLS_START_BY_COMMAND ? TIMELINE_NEXT : TIMELINE_GENLOCK));
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
     for (uint32_t n = 0; n < 2; n++) pio_execute(guards[n], PIO_JMP | GUARD_ORIGIN);
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
@@ -121,6 +118,8 @@ bool player_arm(const struct sequence* sequence, bool at_edge) {
 }
 
 void player_start(void) {
+    if (started_by != OLS_START_BY_COMMAND)
+        pio_execute(timeline, PIO_SET_PINS | 1);  // READY, as the later waits have it
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(timeline.machine);
 }
 

@@ -90,6 +90,7 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
 enum {
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
+    GPIO_FUNCTION_PIO1 = 7,
     GPIO_OUTPUT_INVERTED = 1 << 8,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
     GPIO_INPUT_INVERTED = 1 << 16,
@@ -144,6 +145,7 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SHIFT_OUT_RIGHT (1u << 19)
 #define PIO_PINS_OUT(base, count) ((uint32_t)(count) << 20 | (uint32_t)(base))
 #define PIO_PINS_IN(base) ((uint32_t)(base) << 15)
+#define PIO_PINS_SET(base, count) ((uint32_t)(count) << 26 | (uint32_t)(base) << 5)
 #define PIO_PINS_SIDE(base, count) ((uint32_t)(count) << 29 | (uint32_t)(base) << 10)
 // Instructions that the processor executes on a machine (3.4)
 enum {
@@ -152,7 +154,9 @@ enum {
     PIO_MOV_PINS_NULL = 0xa003,  // with side-set 0 where the machine has one
     PIO_MOV_Y_OSR = 0xa047,
     PIO_MOV_X_ONES = 0xa02b,  // mov x, ~null
-    PIO_MOV_ISR_OSR = 0xa0c7
+    PIO_MOV_ISR_OSR = 0xa0c7,
+    PIO_MOV_OSR_ONES = 0xa0eb,  // mov osr, ~null
+    PIO_SET_PINS = 0xe000       // | value
 };
 
 // DMA (2.5.7)
@@ -177,6 +181,7 @@ enum {
     DMA_REQUEST_PIO0_TX0 = 0,
     DMA_REQUEST_PIO0_TX1 = 1,
     DMA_REQUEST_PIO1_RX0 = 12,
+    DMA_REQUEST_PIO1_RX1 = 13,
     DMA_REQUEST_NONE = 0x3f
 };
 

@@ -8,6 +8,7 @@
 #include "fault.h"
 #include "frame.h"
 #include "player.h"
+#include "receptor.h"
 #include "sequence.h"
 #include "text.h"
 #include "trigger_log.h"
@@ -30,11 +31,12 @@ static uint32_t checked_bytes;      // of a sequence that is being checked, turn
 static uint32_t checked_crc32;
 static uint64_t start_us;
 static uint32_t stamps_read;
-static uint32_t cycles_of_done;   // of the program that has played to its end
-static bool at_edge;              // GENLOCK starts, not the command alone
-static uint32_t heartbeat_ticks;  // 0: the host may be silent
-static uint64_t heard_us;         // when the host's last request came
-static uint8_t programs_swapped;  // since start
+static uint32_t cycles_of_done;  // of the program that has played to its end
+static enum ols_start_source started_by;
+static uint32_t edges_seen, edges_missed;  // since start, where each cycle waits for one
+static uint32_t heartbeat_ticks;           // 0: the host may be silent
+static uint64_t heard_us;                  // when the host's last request came
+static uint8_t programs_swapped;           // since start
 
 static bool refuse(struct ols_error_reply* error, enum ols_error_code code, const char* reason) {
     error->code = (uint16_t)code;
@@ -57,7 +59,7 @@ static uint64_t ticks_since_start(void) {
 }
 
 static uint32_t sequence_bytes(const struct sequence* sequence) {
-    return sequence->header.program_bytes + 4 * (1 + sequence->cycle_words);
+    return sequence->header.program_bytes + 4 * (2 + sequence->cycle_words);
 }
 
 // Goes on with the CRC of a sequence's words; true when it is complete. All at once would take half of the watchdog's
@@ -93,8 +95,20 @@ static void take_next(void) {
     next = OLS_NEXT_NONE;
 }
 
+static void count_edges(void) {
+    if (started_by != OLS_START_EACH_CYCLE_BY_EDGE) return;
+    edges_missed = receptor_missed();
+    edges_seen = receptor_edges();
+}
+
+static void stop_receptor(void) {
+    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+    receptor_stop();
+}
+
 // Play is over: a program that was ready to follow is the one to play next.
 static void end_play(enum ols_state ended) {
+    stop_receptor();
     player_stop();
     fault_note_idle();
     if (next == OLS_NEXT_READY || next == OLS_NEXT_SWAPPING) take_next();
@@ -102,6 +116,7 @@ static void end_play(enum ols_state ended) {
 }
 
 static void end_in_fault(enum ols_fault cause, uint64_t ticks) {
+    stop_receptor();
     fault_latch(cause, trigger_log_slot(), ticks);
     forget_next();
     state = OLS_STATE_FAULT;
@@ -109,7 +124,7 @@ static void end_in_fault(enum ols_fault cause, uint64_t ticks) {
 
 void stage_init(void) {
     forget_programs();
-    trigger_log_begin(current);
+    trigger_log_begin(current, false);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;
 }
 
@@ -172,7 +187,9 @@ void stage_poll(bool host_is_there) {
             return end_in_fault(cause, playing ? ticks_since_start() : 0);
         }
     }
-    if (state == OLS_STATE_WAITING && !player_waiting()) begin_play();
+    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+    // A cycle may be over, and the next one waited for, before this turn could see it play.
+    if (state == OLS_STATE_WAITING && (edges_seen > 0 || !player_waiting())) begin_play();
     if (state == OLS_STATE_PLAYING) follow_play();
 }
 
@@ -262,8 +279,13 @@ void stage_begin_request(void) {
 static bool arm_is_safe(const struct ols_arm* arm, struct ols_error_reply* error) {
     if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
         return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
-    if (arm->start_source > OLS_START_BY_EDGE || arm->reserved[0] || arm->reserved[1] || arm->reserved[2])
-        return refuse(error, OLS_ERROR_BAD_PROGRAM, "start_source is 0 (command) or 1 (edge), reserved fields are 0");
+    if (arm->start_source > OLS_START_EACH_CYCLE_BY_EDGE || arm->reserved[0] || arm->reserved[1] || arm->reserved[2])
+        return refuse(error, OLS_ERROR_BAD_PROGRAM,
+                      "start_source is 0 (command), 1 (edge) or 2 (edges); reserved is 0");
+    const bool debounces = arm->start_source == OLS_START_EACH_CYCLE_BY_EDGE;
+    if (debounces ? arm->debounce_ticks < OLS_DEBOUNCE_TICKS_MIN || arm->debounce_ticks % 2 : arm->debounce_ticks != 0)
+        return refuse(error, OLS_ERROR_BAD_PROGRAM,
+                      "debounce_ticks is even and 4 at least with start_source 2, else 0");
     board_stop_inputs();  // forgets edges of the past
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP)
@@ -284,12 +306,14 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
         refuse_fault(error);
         return STAGE_REFUSED;
     }
-    trigger_log_begin(current);
+    started_by = arm->start_source;
+    trigger_log_begin(current, started_by == OLS_START_EACH_CYCLE_BY_EDGE);
     programs_swapped = 0;
     stamps_read = 0;
-    at_edge = arm->start_source == OLS_START_BY_EDGE;
-    witness_arm(at_edge);
-    if (!player_arm(current, at_edge)) {
+    edges_seen = edges_missed = 0;
+    witness_arm(started_by);
+    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) receptor_arm(arm->debounce_ticks);
+    if (!player_arm(current, started_by)) {
         end_in_fault(OLS_FAULT_SHIFTER_STARVED, 0);
         refuse_fault(error);
         return STAGE_REFUSED;
@@ -304,7 +328,8 @@ bool stage_start(struct ols_error_reply* error) {
     begin_play();
     witness_start();
     player_start();
-    if (at_edge) state = OLS_STATE_WAITING;
+    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) receptor_start();
+    if (started_by != OLS_START_BY_COMMAND) state = OLS_STATE_WAITING;
     return true;
 }
 
@@ -329,6 +354,10 @@ static bool next_fits(struct ols_error_reply* error) {
 enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_reply* error) {
     if (state != OLS_STATE_PLAYING || next != OLS_NEXT_READY) {
         refuse_state(error, "nothing to swap: load the next program while one is playing");
+        return STAGE_REFUSED;
+    }
+    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) {
+        refuse_state(error, "cycles that wait for edges are not swapped: stop, and arm the next program");
         return STAGE_REFUSED;
     }
     if (!check_words(spare)) return STAGE_BUSY;
@@ -369,5 +398,7 @@ void stage_status(struct ols_status_reply* status) {
                                         .cycles_played = done ? cycles_of_done : trigger_log_cycle(),
                                         .log_entries_lost = trigger_log_lost(),
                                         .program_crc32 = current->header.program_crc32,
-                                        .next = (uint8_t)next};
+                                        .next = (uint8_t)next,
+                                        .edges_seen = edges_seen,
+                                        .edges_missed = edges_missed};
 }

@@ -35,7 +35,8 @@ def independent(source):
     return list(adafruit_pioasm.assemble(source))
 
 
-@pytest.mark.parametrize('number, name', [(0, 'timeline'), (1, 'shifter'), (2, 'guard'), (3, 'witness')])
+@pytest.mark.parametrize('number, name', [(0, 'timeline'), (1, 'shifter'), (2, 'guard'), (3, 'witness'),
+                                          (4, 'receptor')])
 def test_pulse_pio_assembles_to_the_words_of_an_independent_assembler(number, name):
     program = pioasm.parse(PULSE, {})[number]
     assert program.name == name

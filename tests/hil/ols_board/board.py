@@ -125,13 +125,13 @@ class Link:
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
                  "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille",
-                 "edge_start_ticks")
+                 "edge_start_ticks", "cycle_edge_ticks")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 
     def status(self):
         names = ("state", "fault", "fault_slot", "boot_nonce", "fault_ticks", "now_ticks", "triggers_fired",
-                 "cycles_played", "log_entries_lost", "program_crc32", "next")
+                 "cycles_played", "log_entries_lost", "program_crc32", "next", "edges_seen", "edges_missed")
         return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
 
     def load(self, program, chunk_bytes=1000):
@@ -141,8 +141,8 @@ class Link:
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)
 
-    def arm(self, heartbeat_ticks=0, start=wire.BY_COMMAND):
-        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks, start))
+    def arm(self, heartbeat_ticks=0, start=wire.BY_COMMAND, debounce_ticks=0):
+        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks, start, debounce_ticks))
 
     def play(self, program, heartbeat_ticks=0):
         self.load(program)
