@@ -33,7 +33,7 @@ def test_every_trigger_and_shift_word_of_two_cycles_is_right_by_two_checkers(emu
     (tmp_path / "program.json").write_text(json.dumps(program))
     result = subprocess.run([sys.executable, ROOT / "tests/hil/check_trace.py", board.trace, tmp_path / "program.json"],
                             capture_output=True, text=True)
-    (report,) = json.loads(result.stdout)
+    report = json.loads(result.stdout)
     assert result.returncode == 0 and report["right"], report
     assert report["own"]["triggers"] == report["sigrok"]["triggers"] == 360
     assert report["own"]["shift_words_checked"] == report["sigrok"]["shift_words_checked"] == 360
