@@ -8,6 +8,7 @@
 #include "light_watch.h"
 #include "link.h"
 #include "player.h"
+#include "receptor.h"
 #include "stage.h"
 #include "usb.h"
 #include "witness.h"
@@ -17,6 +18,7 @@ int main(void) {
     player_init();
     witness_init();
     light_watch_init();
+    receptor_init();
     fault_init();
     stage_init();
     usb_init();
