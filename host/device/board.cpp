@@ -84,6 +84,7 @@ const char* state_name(uint8_t state) {
         case OLS_STATE_PLAYING: return "playing";
         case OLS_STATE_DONE: return "done";
         case OLS_STATE_FAULT: return "fault";
+        case OLS_STATE_WAITING: return "waiting";
         default: return "unknown";
     }
 }
@@ -167,8 +168,10 @@ Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
     return reply;
 }
 
-Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
+Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles,
+                   const Playback& playback) {
     ols_load_begin begin{};
+    describe_triggers(playback, begin);
     begin.slot_count = slot_count;
     begin.chain_bits = chain_bits;
     begin.cycles = cycles;
@@ -187,8 +190,8 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
     return command(OLS_LOAD_END);
 }
 
-Status Board::arm() {
-    const ols_arm arm{};  // no heartbeat: a capture host may be busy for longer than it is good to play on
+Status Board::arm(const Playback& playback) {
+    const ols_arm arm = arm_message(playback);
     const auto reply = request(OLS_ARM, bytes_of(arm));
     if (!reply.ok()) return reply.error();
     return Done{};
@@ -204,6 +207,10 @@ Status Board::stop() {
 
 Status Board::clear_fault() {
     return command(OLS_CLEAR_FAULT);
+}
+
+Result<ols_swap_reply> Board::swap() {
+    return ask<ols_swap_reply>(OLS_SWAP);
 }
 
 Result<ols_status_reply> Board::status() {
