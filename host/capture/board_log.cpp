@@ -54,7 +54,7 @@ std::string BoardLog::follow() {
         const auto status = board_.status();
         if (!status.ok()) return status.error().message;
         if (status->boot_nonce != board_.info().boot_nonce) return "the board was reset";
-        if (status->state != OLS_STATE_PLAYING)
+        if (status->state != OLS_STATE_PLAYING && status->state != OLS_STATE_WAITING)
             ending = reason_to_end(*status);
         else
             std::this_thread::sleep_for(poll_pause);

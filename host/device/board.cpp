@@ -185,8 +185,10 @@ Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
     return reply;
 }
 
-Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
+Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles,
+                   const Playback& playback) {
     ols_load_begin begin{};
+    describe_triggers(playback, begin);
     begin.slot_count = slot_count;
     begin.chain_bits = chain_bits;
     begin.cycles = cycles;
@@ -205,8 +207,8 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
     return command(OLS_LOAD_END);
 }
 
-Status Board::arm() {
-    const ols_arm arm{};  // no heartbeat: a capture host may be busy for longer than it is good to play on
+Status Board::arm(const Playback& playback) {
+    const ols_arm arm = arm_message(playback);
     const auto reply = request(OLS_ARM, bytes_of(arm));
     if (!reply.ok()) return reply.error();
     return Done{};
@@ -226,6 +228,10 @@ Status Board::clear_fault() {
 
 Status Board::reboot_to_bootloader() {
     return command(OLS_REBOOT_TO_BOOTLOADER);
+}
+
+Result<ols_swap_reply> Board::swap() {
+    return ask<ols_swap_reply>(OLS_SWAP);
 }
 
 Result<ols_status_reply> Board::status() {

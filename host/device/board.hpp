@@ -10,6 +10,7 @@
 
 #include "device/transfer.hpp"
 #include "frame.h"
+#include "stage/playback.hpp"
 #include "wire.h"
 
 namespace ols {
@@ -42,9 +43,13 @@ class Board {
     const ols_hello_reply& info() const { return info_; }
     std::string id() const;  // the flash chip's unique number, in hex
 
-    // Sends a program (encode_program) of `slot_count` slots in chunks; `cycles` 0 plays until stopped.
-    Status load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles);
-    Status arm();
+    // Sends a program (encode_program) of `slot_count` slots in chunks; `cycles` 0 plays until stopped. While the board plays
+    // it is the one that swap lets follow.
+    Status load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles,
+                const Playback& playback = {});
+    Status arm(const Playback& playback = {});
+    // Lets the program loaded last follow at the end of a cycle, which the reply names.
+    Result<ols_swap_reply> swap();
     Status start();
     Status stop();
     Status clear_fault();

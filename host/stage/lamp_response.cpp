@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stage/playback.hpp"
+
 namespace ols {
 
 namespace {
 
-constexpr double ticks_per_us = 125;
 constexpr double shortest_event_ticks = 8, latch_ticks = 12;  // PROTOCOL.md: the wait before a latch, and the latch
 
 struct Pulse {
@@ -43,7 +44,7 @@ struct Lamp {
 
 // From 10 to 90 % an exponential takes ln 9 time constants.
 double time_constant_ticks(double ten_to_ninety_us) {
-    return ten_to_ninety_us * ticks_per_us / std::log(9.0);
+    return ten_to_ninety_us * double(ticks_per_us) / std::log(9.0);
 }
 
 double light_ticks(const LampResponse& lamp, const std::vector<Pulse>& pulses, uint32_t level) {
@@ -53,8 +54,8 @@ double light_ticks(const LampResponse& lamp, const std::vector<Pulse>& pulses, u
     for (size_t n = 0; n < pulses.size(); ++n) {
         if (!(level >> (pulses.size() - 1 - n) & 1)) continue;
         // Where delays make pulses overlap, the lamp stays on; where they eat a pulse up, it stays off.
-        const double on = std::max(at, pulses[n].on_ticks + lamp.on_delay_us * ticks_per_us);
-        const double off = pulses[n].off_ticks + lamp.off_delay_us * ticks_per_us;
+        const double on = std::max(at, pulses[n].on_ticks + lamp.on_delay_us * double(ticks_per_us));
+        const double off = pulses[n].off_ticks + lamp.off_delay_us * double(ticks_per_us);
         if (off <= on) continue;
         now.approach(0, fall, on - at);
         now.approach(1, rise, off - on);

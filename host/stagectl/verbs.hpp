@@ -8,6 +8,7 @@
 namespace ols {
 
 void add_run_verb(CLI::App& app, int& exit_code);
+void add_play_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);
 void add_sequence_verb(CLI::App& app, int& exit_code);
 void add_calibrate_verb(CLI::App& app, int& exit_code);
