@@ -38,7 +38,7 @@ export class Board {
   constructor(image, options) {
     this.#image = image;
     this.#options = options;
-    this.#injections = [...options.injections];
+    this.#injections = options.injections.map((injection) => ({ ...injection }));
     this.#logger = onceLogger(options.log);
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
   }
@@ -143,14 +143,18 @@ export class Board {
     if (levels === this.#levels) return;
     if (levels & ~this.#levels & TRIGGER_MASK) {
       this.#triggers++;
-      if (this.#injections.some(({ trigger }) => trigger <= this.#triggers)) this.#parts.lockstep.stop();
+      for (const injection of this.#injections) {
+        if (injection.trigger !== this.#triggers) continue;
+        injection.tick = tick + injection.delay;
+        this.#parts.lockstep.stop(); // for run() to look when it is due
+      }
     }
     this.#levels = levels;
     this.#options.onEdge(tick, levels);
   }
 
   #injectDue() {
-    const due = this.#injections.filter(({ tick, trigger }) => tick <= this.tick || trigger <= this.#triggers);
+    const due = this.#injections.filter(({ tick }) => tick <= this.tick);
     this.#injections = this.#injections.filter((injection) => !due.includes(injection));
     for (const { name, inject } of due) {
       this.#options.log(`injected at tick ${this.tick}: ${name}`);
