@@ -17,8 +17,7 @@ BOARDS = sorted((ROOT / 'firmware' / 'boards').glob('*.toml'))
 BOARD_IDS = [path.stem for path in BOARDS]
 
 # Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 15 on pins 1 to 20, every fifth pair of which has a ground.
-PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 21) if pin not in (3, 8, 13, 18)]),
-            16: 21, 17: 22, 18: 24, 19: 25, 20: 26, 21: 27, 22: 29}
+PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 30) if pin not in (3, 8, 13, 18, 23, 28)])}
 # Adafruit's schematic of the Feather RP2040 CAN, sheet 1: headers JP1 and JP3.
 FEATHER_PIN = {'TX': 0, 'RX': 1, 'SDA': 2, 'SCL': 3, 'D4': 4, 'D5': 5, 'D6': 6, 'MISO': 8, 'D9': 9, 'D10': 10, 'D11': 11,
                'D12': 12, 'D13': 13, 'SCK': 14, 'MOSI': 15, 'D24': 24, 'D25': 25, 'A0': 26, 'A1': 27, 'A2': 28, 'A3': 29}
