@@ -17,7 +17,7 @@ BOARDS = sorted((ROOT / 'firmware' / 'boards').glob('*.toml'))
 BOARD_IDS = [path.stem for path in BOARDS]
 
 # Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 15 on pins 1 to 20, every fifth pair of which has a ground.
-PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 21) if pin not in (3, 8, 13, 18)])}
+PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 30) if pin not in (3, 8, 13, 18, 23, 28)])}
 # Adafruit's schematic of the Feather RP2040 CAN, sheet 1: headers JP1 and JP3.
 FEATHER_PIN = {'TX': 0, 'RX': 1, 'SDA': 2, 'SCL': 3, 'D4': 4, 'D5': 5, 'D6': 6, 'MISO': 8, 'D9': 9, 'D10': 10, 'D11': 11,
                'D12': 12, 'D13': 13, 'SCK': 14, 'MOSI': 15, 'D24': 24, 'D25': 25, 'A0': 26, 'A1': 27, 'A2': 28, 'A3': 29}
@@ -62,8 +62,8 @@ def test_the_feathers_header_pins_are_those_of_its_schematic():
 
 
 @pytest.mark.parametrize('change, message', [
-    (lambda b: b['outputs']['TRIG2'].update(gpio=20), 'consecutive'),
-    (lambda b: b['stop_inputs']['OPEN_LAMP'].update(gpio=20), 'consecutive'),
+    (lambda b: b['outputs']['TRIG2'].update(gpio=28), 'consecutive'),
+    (lambda b: b['stop_inputs']['OPEN_LAMP'].update(gpio=28), 'consecutive'),
     (lambda b: b['inputs']['GENLOCK'].update(gpio=5), 'GPIO 5 is both LIGHT_EN and GENLOCK'),
     (lambda b: b['inputs']['GENLOCK'].update(gpio=30), 'GPIO 0 to 29'),
     (lambda b: b['outputs'].pop('SYNC'), r'\[outputs\] must name'),
