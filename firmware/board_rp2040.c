@@ -57,9 +57,12 @@ static void init_clocks(void) {
 
 static uint32_t inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN;
 
+static const uint8_t output_pins[] = BOARD_OUTPUT_PINS;
+enum { OUTPUT_PINS = sizeof output_pins };
+
 static void set_pins(uint32_t function) {
-    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
-        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
+        const uint32_t pin = output_pins[n];
         // Both ways, so that the witness sees a trigger as the timeline plays it.
         const uint32_t inversion = inverted_pins >> pin & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
         GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | inversion;
@@ -78,8 +81,8 @@ void board_connect_pins(uint8_t inverted_triggers) {
 
 static void init_pins(void) {
     board_dark();
-    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
-        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
+        const uint32_t pin = output_pins[n];
         const bool pull_up = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
         PAD_GPIO(pin) = PAD_INPUT | PAD_4MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
     }

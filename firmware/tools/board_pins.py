@@ -85,11 +85,11 @@ def header(board):
     if can:
         pairs += [(f'BOARD_PIN_{name}', can['pins'][name]['gpio']) for name in CAN_PINS]
         pairs += [('BOARD_CAN_SPI', can['spi']), ('BOARD_CAN_OSCILLATOR_HZ', can['oscillator_hz'])]
-    mask = sum(1 << pin['gpio'] for pin in outputs.values())
+    gpios = ', '.join(str(outputs[name]['gpio']) for name in OUTPUTS)
     lines = ['// SPDX-License-Identifier: MIT', f'// Made by board_pins.py from boards/{board["name"]}.toml.',
              '#ifndef OLS_BOARD_PINS_H', '#define OLS_BOARD_PINS_H', '', f'#define BOARD_NAME "{board["name"]}"',
              f'#define BOARD_HAS_CAN {int(bool(can))}',
-             f'#define BOARD_OUTPUT_PINS 0x{mask:08x}u  // bit n: GPIO n is one of the outputs', '']
+             f'#define BOARD_OUTPUT_PINS {{{gpios}}}', '']
     return '\n'.join(lines + enum(pairs) + ['', '#endif']) + '\n'
 
 
