@@ -22,6 +22,7 @@ EXIT_CYCLES = 13 + 8
 LOOPS = {
     "board_dark": 10,  # the chain's and the timeline's pins
     "board_connect_pins": 10,
+    "prepare_dark": 10,
     "board_time_us": 2,  # the timer's upper half changes once in 71 minutes
     "interrupt_stop_inputs": 3,  # inputs
 }
