@@ -27,7 +27,7 @@ struct link {
 enum { USB_LINK, CAN_LINK, LINKS, NO_LINK = -1 };
 static const struct transport* const transports[LINKS] = {[USB_LINK] = &usb_transport, [CAN_LINK] = &can_transport};
 static struct link links[LINKS];
-static int asking = NO_LINK;  // whose request takes several turns: the others wait
+static int asking = NO_LINK;          // whose request takes several turns: the others wait
 static volatile int owner = NO_LINK;  // who armed last
 
 // A reply being made; without `ok` it is the error. `busy`: the request takes another turn of the main loop.
@@ -58,21 +58,21 @@ static void take_answer(enum stage_answer answer, struct reply* reply) {
 static void answer_hello(const struct ols_frame* request, struct reply* reply) {
     (void)request;  // its hash is for boards that could speak more than one layout
     struct ols_hello_reply* const hello = &reply->payload.hello;
-    *hello = (struct ols_hello_reply){
-        .layout_hash = OLS_LAYOUT_HASH,
-        .firmware_version = BOARD_FIRMWARE_VERSION,
-        .boot_nonce = board_boot_nonce(),
-        .tick_hz = BOARD_TICK_HZ,
-        .capabilities = OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP | OLS_CAN_START_BY_EDGE | OLS_CAN_GREY | OLS_CAN_DIGEST |
-                        (can_is_there() ? OLS_CAN_SPEAK_CAN : 0),
-        .chain_bits = BOARD_CHAIN_BITS,
-        .slots_max = OLS_SLOTS_MAX,
-        .shift_ticks = slot_shift_ticks(&board_sequence),
-        .slot_gap_ticks = slot_gap_ticks(),
-        .lamps_lit_max = board_sequence.limits.lamps_lit_max,
-        .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
-        .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
-        .board = BOARD_NAME};
+    *hello = (struct ols_hello_reply){.layout_hash = OLS_LAYOUT_HASH,
+                                      .firmware_version = BOARD_FIRMWARE_VERSION,
+                                      .boot_nonce = board_boot_nonce(),
+                                      .tick_hz = BOARD_TICK_HZ,
+                                      .capabilities = OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP | OLS_CAN_START_BY_EDGE |
+                                                      OLS_CAN_GREY | OLS_CAN_DIGEST |
+                                                      (can_is_there() ? OLS_CAN_SPEAK_CAN : 0),
+                                      .chain_bits = BOARD_CHAIN_BITS,
+                                      .slots_max = OLS_SLOTS_MAX,
+                                      .shift_ticks = slot_shift_ticks(&board_sequence),
+                                      .slot_gap_ticks = slot_gap_ticks(),
+                                      .lamps_lit_max = board_sequence.limits.lamps_lit_max,
+                                      .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
+                                      .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
+                                      .board = BOARD_NAME};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;
 }
@@ -228,8 +228,8 @@ static bool take_packet(int n) {
         link->packet_bytes = transports[n]->receive(link->packet);
         if (link->packet_bytes == 0) return false;
     }
-    link->packet_used += ols_frame_parser_write(&link->parser, link->packet + link->packet_used,
-                                                link->packet_bytes - link->packet_used);
+    link->packet_used +=
+        ols_frame_parser_write(&link->parser, link->packet + link->packet_used, link->packet_bytes - link->packet_used);
     return true;
 }
 

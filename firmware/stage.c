@@ -423,8 +423,10 @@ static uint32_t cycles_played(void) {
 
 struct ols_canbus_state stage_summary(void) {
     const struct fault fault = fault_latched();
-    return (struct ols_canbus_state){
-        .state = (uint8_t)state, .fault = (uint8_t)fault.cause, .fault_slot = fault.slot, .cycles_played = cycles_played()};
+    return (struct ols_canbus_state){.state = (uint8_t)state,
+                                     .fault = (uint8_t)fault.cause,
+                                     .fault_slot = fault.slot,
+                                     .cycles_played = cycles_played()};
 }
 
 void stage_status(struct ols_status_reply* status) {

@@ -21,8 +21,8 @@ Status check_cycle(const ols_cycle_digest& digest, std::span<const ols_trigger_l
     }
     const std::string cycle = fmt::format("cycle {} of program {}: ", uint32_t(digest.cycle), digest.program);
     if (own.trigger_count != digest.trigger_count)
-        return fail(fmt::format("{}{} triggers were read and {} fired: read the log before the board overwrites it", cycle,
-                                uint16_t(own.trigger_count), uint16_t(digest.trigger_count)));
+        return fail(fmt::format("{}{} triggers were read and {} fired: read the log before the board overwrites it",
+                                cycle, uint16_t(own.trigger_count), uint16_t(digest.trigger_count)));
     if (own.first_counter != digest.first_counter)
         return fail(fmt::format("{}begins with trigger {} and not {}", cycle, uint32_t(own.first_counter),
                                 uint32_t(digest.first_counter)));

@@ -33,8 +33,8 @@ Status print_cycles(Board& board) {
         if (read->digests.empty()) return Done{};
         for (const ols_cycle_digest& digest : read->digests) {
             const Status checked = check_cycle(digest, entries);
-            fmt::print("cycle {} of program {}: {} triggers, {} to {} ticks, {}{}\n", uint32_t(digest.cycle), digest.program,
-                       uint16_t(digest.trigger_count), uint64_t(digest.first_rise_ticks),
+            fmt::print("cycle {} of program {}: {} triggers, {} to {} ticks, {}{}\n", uint32_t(digest.cycle),
+                       digest.program, uint16_t(digest.trigger_count), uint64_t(digest.first_rise_ticks),
                        uint64_t(digest.last_rise_ticks), checked.ok() ? "as logged" : checked.error().message,
                        digest.flags & OLS_DIGEST_INCOMPLETE ? " (incomplete)" : "");
         }

@@ -16,7 +16,7 @@ import board_pins  # noqa: E402
 BOARDS = sorted((ROOT / 'firmware' / 'boards').glob('*.toml'))
 BOARD_IDS = [path.stem for path in BOARDS]
 
-# Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 15 on pins 1 to 20, every fifth pair of which has a ground.
+# Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 22 on pins 1 to 29, every fifth pair of which has a ground.
 PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 30) if pin not in (3, 8, 13, 18, 23, 28)])}
 # Adafruit's schematic of the Feather RP2040 CAN, sheet 1: headers JP1 and JP3.
 FEATHER_PIN = {'TX': 0, 'RX': 1, 'SDA': 2, 'SCL': 3, 'D4': 4, 'D5': 5, 'D6': 6, 'MISO': 8, 'D9': 9, 'D10': 10, 'D11': 11,

@@ -36,7 +36,8 @@ TEST(CycleCheck, EntriesThatAreTheBoardsPassWhateverElseWasRead) {
 TEST(CycleCheck, EveryDifferenceIsNamed) {
     const auto entries = log_of_three_cycles();
     const ols_cycle_digest right = digest_of_the_second(entries);
-    EXPECT_NE(difference(right, std::span(entries).subspan(5)).find("3 triggers were read and 4 fired"), std::string::npos);
+    EXPECT_NE(difference(right, std::span(entries).subspan(5)).find("3 triggers were read and 4 fired"),
+              std::string::npos);
     auto damaged = entries;
     damaged[6].slot ^= 1;
     EXPECT_NE(difference(right, damaged).find("CRC"), std::string::npos);

@@ -107,9 +107,10 @@ TEST(Wire, loading) {
 
 TEST(Wire, digests) {
     expect_golden("read_digests", OLS_READ_DIGESTS, join(ols_read_digests{17, OLS_DIGESTS_MAX, 0}));
-    expect_golden("digests_reply", OLS_READ_DIGESTS | OLS_REPLY,
-                  join(ols_digests_reply{17, 19, 2, 1, 0},
-                       ols_cycle_digest{0x1'0000'0000, 0x1'009e'0fe8, 3060, 17, 0x363d6b0e, 180, 1, OLS_DIGEST_INCOMPLETE}));
+    expect_golden(
+        "digests_reply", OLS_READ_DIGESTS | OLS_REPLY,
+        join(ols_digests_reply{17, 19, 2, 1, 0},
+             ols_cycle_digest{0x1'0000'0000, 0x1'009e'0fe8, 3060, 17, 0x363d6b0e, 180, 1, OLS_DIGEST_INCOMPLETE}));
 }
 
 TEST(Wire, arm) {
