@@ -54,6 +54,7 @@ Result<int> run(const Options& options) {
     const auto& info = board->info();
     if (options.json) {
         const nlohmann::json json = {{"board", board->id()},
+                                     {"board_name", info.board},
                                      {"firmware", info.firmware_version},
                                      {"state", state_name(status->state)},
                                      {"fault", fault_text(*status)},
@@ -65,8 +66,8 @@ Result<int> run(const Options& options) {
                                      {"log_entries_lost", uint32_t(status->log_entries_lost)}};
         fmt::print("{}\n", json.dump(1));
     } else {
-        fmt::print("board {}, firmware {}: {}\nfault: {}\nchain of {} bits, {} slots at most, {} triggers fired\n",
-                   board->id(), info.firmware_version, state_name(status->state), fault_text(*status),
+        fmt::print("board {} ({}), firmware {}: {}\nfault: {}\nchain of {} bits, {} slots at most, {} triggers fired\n",
+                   board->id(), info.board, info.firmware_version, state_name(status->state), fault_text(*status),
                    uint16_t(info.chain_bits), uint16_t(info.slots_max), uint32_t(status->triggers_fired));
     }
     if (options.cycles && !options.json)
