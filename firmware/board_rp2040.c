@@ -55,31 +55,39 @@ static void init_clocks(void) {
     WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | 12;  // 12 MHz / 12: microseconds for timer and watchdog (4.7.2)
 }
 
-static uint32_t inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN;
+static const uint8_t output_pins[] = BOARD_OUTPUT_PINS;
+enum { OUTPUT_PINS = sizeof output_pins };
+// Each output's control register and what makes it dark, ready to be written: there is no time to work it out then.
+static struct {
+    volatile uint32_t* control;
+    uint32_t dark;
+} outputs[OUTPUT_PINS];
 
-static void set_pins(uint32_t function) {
-    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
-        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
-        // Both ways, so that the witness sees a trigger as the timeline plays it.
-        const uint32_t inversion = inverted_pins >> pin & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
-        GPIO_CTRL(pin) = function | GPIO_OUTPUT_ALWAYS | inversion;
+// Bit n of `inverted`: GPIO n is active low. Both ways, so that the witness sees a trigger as the timeline plays it.
+static void prepare_dark(uint32_t inverted) {
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
+        const uint32_t inversion = inverted >> output_pins[n] & 1 ? GPIO_OUTPUT_INVERTED | GPIO_INPUT_INVERTED : 0;
+        outputs[n].control = &GPIO_CTRL(output_pins[n]);
+        outputs[n].dark = GPIO_FUNCTION_SIO | GPIO_OUTPUT_ALWAYS | inversion;
     }
 }
 
 void board_dark(void) {
     // Nobody writes SIO's output register: it holds zero from reset on.
-    set_pins(GPIO_FUNCTION_SIO);
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++) *outputs[n].control = outputs[n].dark;
 }
 
 void board_connect_pins(uint8_t inverted_triggers) {
-    inverted_pins = BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN | (uint32_t)inverted_triggers << BOARD_PIN_TRIG0;
-    set_pins(GPIO_FUNCTION_PIO0);
+    prepare_dark(BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN | (uint32_t)inverted_triggers << BOARD_PIN_TRIG0);
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++)
+        *outputs[n].control = outputs[n].dark ^ GPIO_FUNCTION_SIO ^ GPIO_FUNCTION_PIO0;
 }
 
 static void init_pins(void) {
+    prepare_dark(BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN);
     board_dark();
-    for (uint32_t pin = 0; BOARD_OUTPUT_PINS >> pin; pin++) {
-        if (!(BOARD_OUTPUT_PINS >> pin & 1)) continue;
+    for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
+        const uint32_t pin = output_pins[n];
         const bool pull_up = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
         PAD_GPIO(pin) = PAD_INPUT | PAD_4MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
     }

@@ -103,8 +103,8 @@ static bool tell_digest_part(void) {
         case 3: return tell_rise(OLS_CANBUS_FIRST_RISE, telling.first_rise_ticks);
         case 2: return tell_rise(OLS_CANBUS_LAST_RISE, telling.last_rise_ticks);
         default:
-            return tell(OLS_CANBUS_CYCLE_CRC, &(struct ols_canbus_cycle_crc){.cycle = telling.cycle,
-                                                                             .entries_crc32 = telling.entries_crc32});
+            return tell(OLS_CANBUS_CYCLE_CRC,
+                        &(struct ols_canbus_cycle_crc){.cycle = telling.cycle, .entries_crc32 = telling.entries_crc32});
     }
 }
 
@@ -122,7 +122,8 @@ static void tell_digests(void) {
 
 static void send_frames(uint64_t now_us) {
     struct can_bus_frame frame = {.id = OLS_CANBUS_TO_HOST + OF_THIS_BOARD};
-    while (can_bus_has_room() && (frame.length = isotp_next_frame(&isotp, frame.data, now_us)) > 0) can_bus_send(&frame);
+    while (can_bus_has_room() && (frame.length = isotp_next_frame(&isotp, frame.data, now_us)) > 0)
+        can_bus_send(&frame);
 }
 
 void can_poll(void) {

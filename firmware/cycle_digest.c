@@ -11,8 +11,8 @@ enum { DIGESTS = 32 };
 static struct ols_cycle_digest digests[DIGESTS];
 static uint32_t oldest, made, read_to, lost;  // as in the trigger log
 static uint32_t told;
-static struct ols_cycle_digest under_way;     // without entries while its trigger_count is 0
-static bool gap;                              // entries before the next one are missing
+static struct ols_cycle_digest under_way;  // without entries while its trigger_count is 0
+static bool gap;                           // entries before the next one are missing
 
 void cycle_digest_begin(void) {
     oldest = made = read_to = lost = told = 0;

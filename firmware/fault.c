@@ -53,7 +53,7 @@ void fault_note_idle(void) {
     board_remember((const uint32_t[3]){RECORD_NONE, 0, 0});
 }
 
-_Noreturn void fault_in_exception(void) {
+void fault_in_exception(void) {
     board_dark();
     uint32_t record[3];
     board_recall(record);

@@ -8,6 +8,10 @@
 
 #include "wire.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct fault {
     enum ols_fault cause;  // OLS_FAULT_NONE: no fault is latched
     uint16_t slot;
@@ -29,6 +33,10 @@ void fault_note_progress(uint16_t slot, uint64_t ticks);
 void fault_note_idle(void);
 
 // From an exception handler: dark, note the cause, reset. The fault is latched after the reset.
-_Noreturn void fault_in_exception(void);
+__attribute__((noreturn)) void fault_in_exception(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

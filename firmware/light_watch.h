@@ -6,10 +6,7 @@
 
 #include <stdint.h>
 
-// Loads the PIO program. Once, after witness_init, behind whose program it lies.
-void light_watch_init(void);
-
-// From now on no light may be longer; until the next call. While pins are dark.
+// From now on no light may be longer, until the next call. While pins are dark. Loads the PIO program, behind the witness's.
 void light_watch_arm(uint32_t longest_ticks);
 
 // From the next light on, this is the longest. While a program plays.

@@ -5,7 +5,6 @@
 #include "can.h"
 #include "fault.h"
 #include "interrupts.h"
-#include "light_watch.h"
 #include "link.h"
 #include "player.h"
 #include "receptor.h"
@@ -17,7 +16,6 @@ int main(void) {
     board_init();
     player_init();
     witness_init();
-    light_watch_init();
     receptor_init();
     fault_init();
     stage_init();

@@ -22,19 +22,11 @@ enum {
 };
 
 // Registers (table 11-2)
-enum {
-    CANSTAT = 0x0e,
-    CANCTRL = 0x0f,
-    CNF3 = 0x28,
-    CANINTF = 0x2c,
-    EFLG = 0x2d,
-    TXB0CTRL = 0x30,
-    RXB0CTRL = 0x60
-};
-enum { RECEIVED_0 = 1, RECEIVED_1 = 2, SENT_0 = 4, ALL_SENT = 7 * SENT_0, ERROR = 0x20 };  // CANINTE and CANINTF
-enum { OVERFLOWS = 0xc0, BUS_OFF = 0x20, TRANSMIT_PASSIVE = 0x10 };                 // EFLG
+enum { CANSTAT = 0x0e, CANCTRL = 0x0f, CNF3 = 0x28, CANINTF = 0x2c, EFLG = 0x2d, TXB0CTRL = 0x30, RXB0CTRL = 0x60 };
+enum { RECEIVED_0 = 1, RECEIVED_1 = 2, SENT_0 = 4, ALL_SENT = 7 * SENT_0, ERROR = 0x20 };     // CANINTE and CANINTF
+enum { OVERFLOWS = 0xc0, BUS_OFF = 0x20, TRANSMIT_PASSIVE = 0x10 };                           // EFLG
 enum { MODE_NORMAL = 0x00, MODE_CONFIGURATION = 0x80, ABORT_ALL = 0x10, CTRL_RESET = 0x87 };  // CANCTRL, CANSTAT
-enum { RECEIVE_ROLLOVER = 0x04 };                                                   // RXB0CTRL
+enum { RECEIVE_ROLLOVER = 0x04 };                                                             // RXB0CTRL
 
 // SIDH, SIDL, EID8, EID0, DLC, then data: one layout for sending and receiving.
 enum { ID_HIGH = 0, ID_LOW = 1, LENGTH = 4, DATA = 5, IMAGE_BYTES = 13, EXTENDED = 0x08, REMOTE = 0x10 };
@@ -89,7 +81,8 @@ static bool is_full(const struct ring* ring) {
 // SPI
 
 static void select_controller(bool selected) {
-    GPIO_CTRL(BOARD_PIN_CAN_CS) = GPIO_FUNCTION_NONE | GPIO_OUTPUT_ALWAYS | (selected ? GPIO_OUTPUT_LOW : GPIO_OUTPUT_HIGH);
+    GPIO_CTRL(BOARD_PIN_CAN_CS) =
+        GPIO_FUNCTION_NONE | GPIO_OUTPUT_ALWAYS | (selected ? GPIO_OUTPUT_LOW : GPIO_OUTPUT_HIGH);
 }
 
 // Bytes both ways at once, one instruction: 0.9 us each, 14 at most.
@@ -169,7 +162,7 @@ static void send_queued(void) {
         if (next_buffer == SEND_BUFFERS - 1 && free_buffers != (1 << SEND_BUFFERS) - 1) return;
         load(next_buffer, &to_send.frames[to_send.read % CAN_BUS_RECEIVED_MAX]);
         to_send.read++;
-        free_buffers &= (uint8_t)~(1 << next_buffer);
+        free_buffers &= (uint8_t) ~(1 << next_buffer);
         next_buffer = next_buffer == 0 ? SEND_BUFFERS - 1 : next_buffer - 1;
     }
 }
@@ -248,8 +241,9 @@ static void connect_pins(void) {
 }
 
 static void release_pins(void) {
-    static const uint8_t pins[] = {BOARD_PIN_CAN_CS,   BOARD_PIN_CAN_RESET, BOARD_PIN_CAN_STANDBY, BOARD_PIN_CAN_INTERRUPT,
-                                   BOARD_PIN_CAN_MISO, BOARD_PIN_CAN_SCK,   BOARD_PIN_CAN_MOSI};
+    static const uint8_t pins[] = {BOARD_PIN_CAN_CS,        BOARD_PIN_CAN_RESET, BOARD_PIN_CAN_STANDBY,
+                                   BOARD_PIN_CAN_INTERRUPT, BOARD_PIN_CAN_MISO,  BOARD_PIN_CAN_SCK,
+                                   BOARD_PIN_CAN_MOSI};
     for (size_t i = 0; i < sizeof pins; i++) connect(pins[i], GPIO_FUNCTION_NONE, PAD_PULL_DOWN);
 }
 

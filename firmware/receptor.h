@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-// Loads the PIO program. Once, after light_watch_init, behind whose program it lies.
+// Loads the PIO program, behind witness's and light watch's. Once.
 void receptor_init(void);
 
 // Watches GENLOCK from receptor_start on: a level counts once it stayed for `debounce_ticks`, even and at least

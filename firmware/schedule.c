@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Schedule: owned by the handler that takes stamps. The main loop begins one while no stamp can come, and announces a swap
-// and commits a search of its own while interrupts are held.
+// Schedule: owned by the handler that takes stamps. The main loop begins one while no stamp can come, announces a swap while
+// interrupts are held, and puts a search of its own in place of the handler's if no stamp has come since it began that.
 #include "schedule.h"
 
 #include <stddef.h>
@@ -21,8 +21,9 @@ struct search {
     uint64_t vain_ticks;   // that the last search in vain has passed: a cycle
 };
 
-static struct search search;
-static uint32_t taken;
+static struct search searches[2];
+static struct search* volatile search = searches;  // the one in use
+static volatile uint32_t taken;
 static uint32_t origin_ticks;  // what the first stamp says less when that trigger was due, modulo 2^32
 static uint64_t last_ticks;    // when the last trigger taken was due
 static uint32_t last_cycle;    // and the cycle it was in
@@ -86,25 +87,25 @@ static bool is_whenever_an_edge_comes(const struct search* s) {
 }
 
 void schedule_begin(const struct sequence* sequence, bool cycles_wait) {
-    search = (struct search){.played = sequence};
+    *search = (struct search){.played = sequence};
     each_cycle_waits = cycles_wait;
     taken = 0;
-    seek(&search);
+    seek(search);
 }
 
 void schedule_swap(const struct sequence* next, uint32_t after_cycles) {
-    search.swap_cycle = after_cycles;
-    search.following = next;
+    search->swap_cycle = after_cycles;
+    search->following = next;
 }
 
 void schedule_settle(void) {
-    uint32_t held = board_hold_interrupts();
-    struct search ahead = search;
-    board_release_interrupts(held);
-    if (!waits_for_swap(&ahead)) return;
-    skip_to_swap(&ahead);  // which may take long
-    held = board_hold_interrupts();
-    if (waits_for_swap(&search)) search = ahead;  // else a stamp has been faster
+    const uint32_t taken_before = taken;
+    struct search* const ahead = search == searches ? &searches[1] : searches;
+    *ahead = *search;
+    if (taken != taken_before || !waits_for_swap(ahead)) return;  // a stamp that has just come has settled it
+    skip_to_swap(ahead);                                          // which may take long
+    const uint32_t held = board_hold_interrupts();
+    if (taken == taken_before) search = ahead;
     board_release_interrupts(held);
 }
 
@@ -113,23 +114,26 @@ uint32_t schedule_taken(void) {
 }
 
 bool schedule_take(uint32_t stamp) {
-    if (waits_for_swap(&search)) skip_to_swap(&search);
-    if (!search.is_due) return false;
+    struct search* const s = search;
+    if (waits_for_swap(s)) skip_to_swap(s);
+    if (!s->is_due) return false;
     const uint32_t rise_ticks = ~stamp * WITNESS_COUNT_TICKS;
-    const uint32_t due_ticks = (uint32_t)search.due_ticks;
-    if (taken++ == 0 || is_whenever_an_edge_comes(&search)) origin_ticks = rise_ticks - due_ticks;
-    last_ticks = search.due_ticks;
-    last_cycle = search.due_cycle;
+    const uint32_t due_ticks = (uint32_t)s->due_ticks;
+    if (taken == 0 || is_whenever_an_edge_comes(s)) origin_ticks = rise_ticks - due_ticks;
+    taken++;
+    last_ticks = s->due_ticks;
+    last_cycle = s->due_cycle;
     const int32_t slip_ticks = (int32_t)(rise_ticks - origin_ticks - due_ticks);
     return slip_ticks <= SCHEDULE_TOLERANCE_TICKS && slip_ticks >= -SCHEDULE_TOLERANCE_TICKS;
 }
 
 void schedule_seek(void) {
-    seek(&search);
+    seek(search);
 }
 
 uint32_t schedule_ticks_to_next(void) {
-    if (!search.is_due || is_whenever_an_edge_comes(&search)) return 0;
-    const uint64_t ticks = search.due_ticks - last_ticks;
+    const struct search* const s = search;
+    if (!s->is_due || is_whenever_an_edge_comes(s)) return 0;
+    const uint64_t ticks = s->due_ticks - last_ticks;
     return ticks < UINT32_MAX ? (uint32_t)ticks : 0;
 }

@@ -245,16 +245,17 @@ static void handle_done_buffers(void) {
 
 void usb_poll(void) {
     const uint32_t status = USB_SIE_STATUS;
+    // Before the reset, which ends a suspension; it takes the bus longer than a turn to be idle after one.
+    if (status & (USB_SIE_SUSPENDED | USB_SIE_RESUME)) {
+        USB_SIE_STATUS_CLEAR = status & (USB_SIE_SUSPENDED | USB_SIE_RESUME);
+        suspended = !(status & USB_SIE_RESUME);
+    }
     if (status & USB_SIE_BUS_RESET) {
         USB_SIE_STATUS_CLEAR = USB_SIE_BUS_RESET;
         USB_ADDR_ENDP = 0;
         configured = suspended = false;
         new_address = 0;
         reset_endpoints();
-    }
-    if (status & (USB_SIE_SUSPENDED | USB_SIE_RESUME)) {
-        USB_SIE_STATUS_CLEAR = status & (USB_SIE_SUSPENDED | USB_SIE_RESUME);
-        suspended = !(status & USB_SIE_RESUME);
     }
     // Before setup packets: a finished SET_ADDRESS takes effect before what is asked next.
     if (USB_BUFF_STATUS) handle_done_buffers();

@@ -17,8 +17,7 @@ static void count(struct isotp* isotp, enum isotp_error error) {
 }
 
 void isotp_init(struct isotp* isotp, uint8_t* buffer, uint16_t capacity, uint8_t block_size) {
-    *isotp =
-        (struct isotp){.buffer = buffer, .capacity = capacity, .block_size = block_size, .flow_status = FLOW_NONE};
+    *isotp = (struct isotp){.buffer = buffer, .capacity = capacity, .block_size = block_size, .flow_status = FLOW_NONE};
 }
 
 // Receiving

@@ -91,11 +91,11 @@ def header(board):
     if can:
         pairs += [(f'BOARD_PIN_{name}', can['pins'][name]['gpio']) for name in CAN_PINS]
         pairs += [('BOARD_CAN_SPI', can['spi']), ('BOARD_CAN_OSCILLATOR_HZ', can['oscillator_hz'])]
-    mask = sum(1 << outputs[name]['gpio'] for name in present(board, PLAYER))
+    gpios = ', '.join(str(outputs[name]['gpio']) for name in present(board, PLAYER))
     lines = ['// SPDX-License-Identifier: MIT', f'// Made by board_pins.py from boards/{board["name"]}.toml.',
              '#ifndef OLS_BOARD_PINS_H', '#define OLS_BOARD_PINS_H', '', f'#define BOARD_NAME "{board["name"]}"',
              f'#define BOARD_HAS_CAN {int(bool(can))}',
-             f'#define BOARD_OUTPUT_PINS 0x{mask:08x}u  // bit n: GPIO n is an output of PIO block 0', '']
+             f'#define BOARD_OUTPUT_PINS {{{gpios}}}  // of PIO block 0', '']
     return '\n'.join(lines + enum(pairs) + ['', '#endif']) + '\n'
 
 

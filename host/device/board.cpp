@@ -273,4 +273,19 @@ Result<TriggerLog> Board::read_trigger_log(uint32_t first_counter, uint32_t know
     return log;
 }
 
+Result<CycleDigests> Board::read_digests(uint32_t first_digest) {
+    const ols_read_digests what{first_digest, OLS_DIGESTS_MAX, 0};
+    const auto bytes = request(OLS_READ_DIGESTS, bytes_of(what));
+    if (!bytes.ok()) return bytes.error();
+    ols_digests_reply head;
+    if (bytes->size() < sizeof head) return wrong_reply();
+    std::memcpy(&head, bytes->data(), sizeof head);
+    if (bytes->size() != sizeof head + head.digest_count * sizeof(ols_cycle_digest)) return wrong_reply();
+    CycleDigests read{{}, head.first_digest, head.next_digest, head.digests_lost};
+    read.digests.resize(head.digest_count);
+    if (head.digest_count)
+        std::memcpy(read.digests.data(), bytes->data() + sizeof head, head.digest_count * sizeof(ols_cycle_digest));
+    return read;
+}
+
 }  // namespace ols

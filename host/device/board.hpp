@@ -22,6 +22,14 @@ struct TriggerLog {
     uint32_t entries_lost = 0;  // since start: the board's log had no room
 };
 
+// The digests of cycles that one request gave.
+struct CycleDigests {
+    std::vector<ols_cycle_digest> digests;
+    uint32_t first_digest = 0;  // number of the first of them
+    uint32_t next_digest = 0;   // number that the next one will have
+    uint32_t digests_lost = 0;  // since start: overwritten before they were read
+};
+
 // "timeline_starved: ..." with what to do, for a latched fault (enum ols_fault).
 std::string fault_text(const ols_status_reply& status);
 
@@ -60,6 +68,9 @@ class Board {
     // fired, for up to four at once: at 20 000 triggers a second a message fills in 2.4 ms, which a host that waits for each
     // reply may not keep up with.
     Result<TriggerLog> read_trigger_log(uint32_t first_counter, uint32_t known_counter = 0);
+
+    // The digests from number `first_digest` on, as many as one message holds.
+    Result<CycleDigests> read_digests(uint32_t first_digest);
 
   private:
     explicit Board(std::unique_ptr<Transfer> transfer);

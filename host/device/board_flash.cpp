@@ -96,13 +96,13 @@ Status flash_by_usb(UsbBus& bus, const Target& target, const FirmwareImage& imag
     auto device = bus.open(target.loader);
     if (!device.ok()) return device.error();
     Picoboot loader(std::move(*device));
-    if (const Status taken = take_over(loader); !taken.ok()) return taken;
-    if (const Status fits = check_board(loader, target, image, force_board); !fits.ok()) {
+    if (Status taken = take_over(loader); !taken.ok()) return taken;
+    if (Status fits = check_board(loader, target, image, force_board); !fits.ok()) {
         if (target.was_running && !loader.reboot(reboot_delay_ms).ok())
             return fail(fits.error().message + "; plug it in again to start its firmware");
         return fits;
     }
-    if (const Status written = write_image(loader, image, progress); !written.ok()) return written;
+    if (Status written = write_image(loader, image, progress); !written.ok()) return written;
     return loader.reboot(reboot_delay_ms);
 }
 

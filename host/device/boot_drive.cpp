@@ -70,7 +70,7 @@ Status write_boot_drive(const std::string& path, std::span<const uint8_t> uf2) {
         uf2 = uf2.subspan(size_t(written));
     }
     const bool whole = uf2.empty() && ::fsync(fd) == 0;
-    const Status status = whole ? Status(Done{}) : Status(write_failed(file));
+    Status status = whole ? Status(Done{}) : Status(write_failed(file));
     ::close(fd);
     return status;
 }

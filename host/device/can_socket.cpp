@@ -87,7 +87,8 @@ Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path) {
     if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
         const int error = errno;
         ::close(fd);
-        return fail(fmt::format("cannot reach the CAN bus at '{}': {}; start the stage first", path, std::strerror(error)));
+        return fail(
+            fmt::format("cannot reach the CAN bus at '{}': {}; start the stage first", path, std::strerror(error)));
     }
     auto bus = std::make_unique<CanSocket>(fd, path);
     if (const Status begun = bus->begin(); !begun.ok()) return begun.error();

@@ -24,7 +24,8 @@ const char* error_text(isotp_error error) {
         case ISOTP_WRONG_SN: return "N_WRONG_SN: a frame of the board's message was lost; ask again";
         case ISOTP_INVALID_FS: return "N_INVALID_FS: unknown flow status; does something else use these identifiers?";
         case ISOTP_WAIT_OVERRUN: return "N_WFT_OVRN: the board said wait too often; reset it";
-        case ISOTP_BUFFER_OVERFLOW: return "N_BUFFER_OVFLW: the board has no room, another host is talking to it; ask again";
+        case ISOTP_BUFFER_OVERFLOW:
+            return "N_BUFFER_OVFLW: the board has no room, another host is talking to it; ask again";
         default: return "unknown error";
     }
 }
@@ -84,9 +85,7 @@ class CanTransfer : public Transfer {
                isotp_.errors[ISOTP_WAIT_OVERRUN] + isotp_.errors[ISOTP_BUFFER_OVERFLOW];
     }
 
-    uint64_t lost_receiving() const {
-        return isotp_.errors[ISOTP_TIMEOUT_CR] + isotp_.errors[ISOTP_WRONG_SN];
-    }
+    uint64_t lost_receiving() const { return isotp_.errors[ISOTP_TIMEOUT_CR] + isotp_.errors[ISOTP_WRONG_SN]; }
 
     // Sends what is due, or waits for a frame, at most until `until_us`.
     Status step(uint64_t until_us) {

@@ -32,7 +32,7 @@ Result<std::optional<ImageLabel>> read_label_at(Picoboot& loader, uint32_t page)
 }
 
 Status write_and_compare(Picoboot& loader, uint32_t address, std::span<const uint8_t> bytes) {
-    if (const Status written = loader.write(address, bytes); !written.ok()) return written;
+    if (Status written = loader.write(address, bytes); !written.ok()) return written;
     const auto read = loader.read(address, uint32_t(bytes.size()));
     if (!read.ok()) return read.error();
     const auto at = std::mismatch(bytes.begin(), bytes.end(), read->begin()).first;
@@ -42,7 +42,7 @@ Status write_and_compare(Picoboot& loader, uint32_t address, std::span<const uin
 }
 
 Status write_note(Picoboot& loader, const FirmwareImage& image) {
-    if (const Status erased = loader.erase(note_sector, flash_sector_bytes); !erased.ok()) return erased;
+    if (Status erased = loader.erase(note_sector, flash_sector_bytes); !erased.ok()) return erased;
     return write_and_compare(loader, note_sector,
                              std::span(image.bytes).subspan(label_page - flash_address, flash_page_bytes));
 }
@@ -55,14 +55,14 @@ Status write_sectors(Picoboot& loader, const FirmwareImage& image, const FlashPr
     for (size_t offset = first; offset < all.size(); offset += flash_sector_bytes) {
         const auto sector = all.subspan(offset, std::min<size_t>(flash_sector_bytes, all.size() - offset));
         const uint32_t address = flash_address + uint32_t(offset);
-        if (const Status erased = loader.erase(address, flash_sector_bytes); !erased.ok()) return erased;
-        if (const Status written = write_and_compare(loader, address, sector); !written.ok()) return written;
+        if (Status erased = loader.erase(address, flash_sector_bytes); !erased.ok()) return erased;
+        if (Status written = write_and_compare(loader, address, sector); !written.ok()) return written;
         progress(done += sector.size(), all.size());
     }
     const auto behind_boot2 = all.subspan(flash_page_bytes, first - flash_page_bytes);
-    if (const Status written = write_and_compare(loader, flash_address + flash_page_bytes, behind_boot2); !written.ok())
+    if (Status written = write_and_compare(loader, flash_address + flash_page_bytes, behind_boot2); !written.ok())
         return written;
-    if (const Status written = write_and_compare(loader, flash_address, all.first(flash_page_bytes)); !written.ok())
+    if (Status written = write_and_compare(loader, flash_address, all.first(flash_page_bytes)); !written.ok())
         return written;
     progress(all.size(), all.size());
     return Done{};
@@ -71,13 +71,13 @@ Status write_sectors(Picoboot& loader, const FirmwareImage& image, const FlashPr
 }  // namespace
 
 Status take_over(Picoboot& loader) {
-    if (const Status done = loader.reset(); !done.ok()) return done;
-    if (const Status done = loader.exclusive_access(); !done.ok()) return done;
+    if (Status done = loader.reset(); !done.ok()) return done;
+    if (Status done = loader.exclusive_access(); !done.ok()) return done;
     return loader.exit_xip();
 }
 
 Result<std::optional<ImageLabel>> read_label(Picoboot& loader) {
-    const auto label = read_label_at(loader, label_page);
+    auto label = read_label_at(loader, label_page);
     if (!label.ok() || *label) return label;
     return read_label_at(loader, note_sector);
 }

@@ -114,24 +114,23 @@ Status Picoboot::reset() {
 }
 
 Status Picoboot::exclusive_access() {
-    if (const Status sent = send_command(command_exclusive_access, {{exclusive}, 1}, 0); !sent.ok()) return sent;
+    if (Status sent = send_command(command_exclusive_access, {{exclusive}, 1}, 0); !sent.ok()) return sent;
     return acknowledge(command_exclusive_access);
 }
 
 Status Picoboot::exit_xip() {
-    if (const Status sent = send_command(command_exit_xip, {}, 0); !sent.ok()) return sent;
+    if (Status sent = send_command(command_exit_xip, {}, 0); !sent.ok()) return sent;
     return acknowledge(command_exit_xip);
 }
 
 Status Picoboot::erase(uint32_t address, uint32_t byte_count) {
-    if (const Status sent = send_command(command_flash_erase, {{address, byte_count}, 8}, 0); !sent.ok()) return sent;
+    if (Status sent = send_command(command_flash_erase, {{address, byte_count}, 8}, 0); !sent.ok()) return sent;
     return acknowledge(command_flash_erase);
 }
 
 Status Picoboot::write(uint32_t address, std::span<const uint8_t> bytes) {
     const uint32_t byte_count = uint32_t(bytes.size());
-    if (const Status sent = send_command(command_write, {{address, byte_count}, 8}, byte_count); !sent.ok())
-        return sent;
+    if (Status sent = send_command(command_write, {{address, byte_count}, 8}, byte_count); !sent.ok()) return sent;
     if (const UsbResult sent = device_->write(bytes, timeout_ms); sent.outcome != UsbOutcome::done)
         return refusal(command_write, sent.outcome);
     return acknowledge(command_write);
@@ -150,7 +149,7 @@ Result<std::vector<uint8_t>> Picoboot::read(uint32_t address, uint32_t byte_coun
 
 Status Picoboot::reboot(uint32_t delay_ms) {
     const Arguments from_flash{{0, sram_end, delay_ms}, 12};
-    if (const Status sent = send_command(command_reboot, from_flash, 0); !sent.ok()) return sent;
+    if (Status sent = send_command(command_reboot, from_flash, 0); !sent.ok()) return sent;
     return acknowledge(command_reboot);
 }
 

@@ -87,9 +87,10 @@ Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uin
         ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
         const int error = errno;
         ::close(fd);
-        return fail(fmt::format("no CAN interface '{}' ({}): see `ip link`, then sudo ip link set {} up type can bitrate "
-                                "1000000",
-                                interface, std::strerror(error), interface));
+        return fail(
+            fmt::format("no CAN interface '{}' ({}): see `ip link`, then sudo ip link set {} up type can bitrate "
+                        "1000000",
+                        interface, std::strerror(error), interface));
     }
     return std::unique_ptr<CanBus>(std::make_unique<SocketCan>(fd, interface));
 }

@@ -143,7 +143,10 @@ void arm_from(Script& script) {
 void any_message(Script& script) {
     const uint8_t type = script.byte() % 32;
     const Bytes payload = script.bytes(script.byte() + 4u * (script.byte() % 128));
-    command(type, payload);
+    if (!command(type, payload) || type != OLS_REBOOT_TO_BOOTLOADER) return;
+    expect(!board_host_pins_are_connected());
+    board_host_power_up();  // the boot loader has been, and started it again
+    board_host_attach();
 }
 
 // Bytes that are no frame cost no answer but their own.

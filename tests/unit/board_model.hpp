@@ -73,10 +73,11 @@ class BoardModel {
     std::unique_ptr<LoaderModel> loader;
     bool playing = false, loader_is_dead = false;
     bool loader_may_not_be_opened = false;
-    int transfers = 0;      // so far
-    int unplug_at = -1;     // the transfer at which the cable is pulled
-    int host_dies_at = -1;  // the transfer that the host does not live to see done; the board stays as it is
-    int session = 0;        // handles of earlier sessions are dead
+    bool drive_is_busy = false;  // some program keeps writing to the boot loader's drive
+    int transfers = 0;           // so far
+    int unplug_at = -1;          // the transfer at which the cable is pulled
+    int host_dies_at = -1;       // the transfer that the host does not live to see done; the board stays as it is
+    int session = 0;             // handles of earlier sessions are dead
     std::optional<uint32_t> restart_in_ms;
 
     void hold_image(const Bytes& image) {
@@ -98,6 +99,7 @@ class BoardModel {
         runs = !bootsel && boots() ? Runs::firmware : loader_is_dead ? Runs::nothing : Runs::loader;
         if (runs != Runs::loader) return;
         loader = std::make_unique<LoaderModel>(flash);
+        loader->drive_is_busy = drive_is_busy;
         loader->on_reboot = [this](uint32_t delay_ms) { restart_in_ms = delay_ms; };
     }
     void pull_cable() {

@@ -167,6 +167,15 @@ TEST_F(Flashing, flash_that_does_not_keep_what_is_written_is_named_and_its_firmw
     EXPECT_EQ(board_.runs, Runs::loader);
 }
 
+TEST_F(Flashing, a_program_that_writes_to_the_boot_loaders_drive_does_not_get_in_between) {
+    board_.hold_image(old_);
+    board_.drive_is_busy = true;
+    board_.power_up();
+    const auto report = flash();
+    ASSERT_TRUE(report.ok()) << report.error().message;
+    EXPECT_TRUE(holds(new_));
+}
+
 TEST_F(Flashing, a_board_that_does_not_come_back_as_boot_loader_is_waited_for_and_named) {
     board_.hold_image(old_);
     board_.power_up();

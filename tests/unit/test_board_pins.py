@@ -92,8 +92,10 @@ def test_the_compiler_reads_the_header_as_the_source_says(path, tmp_path):
     names = ['DATA', 'CLK', 'LATCH', 'LIGHT_EN', 'TRIG0', 'SYNC', 'TIMELINE', 'STOP_INPUTS', 'GENLOCK', 'PHOTO']
     program = tmp_path / 'print.c'
     (tmp_path / 'board_pins.h').write_text(board_pins.header(board))
-    program.write_text('#include <stdio.h>\n#include "board_pins.h"\nint main(void) { printf("[\\"%s\\", %u' +
-                       ', %d' * len(names) + ']", BOARD_NAME, BOARD_OUTPUT_PINS, ' +
+    program.write_text('#include <stdio.h>\n#include "board_pins.h"\n'
+                       'int main(void) { const int outputs[] = BOARD_OUTPUT_PINS; unsigned mask = 0;'
+                       'for (unsigned n = 0; n < sizeof outputs / sizeof *outputs; n++) mask |= 1u << outputs[n];'
+                       'printf("[\\"%s\\", %u' + ', %d' * len(names) + ']", BOARD_NAME, mask, ' +
                        ', '.join(f'BOARD_PIN_{name}' for name in names) + '); }\n')
     subprocess.run(['cc', '-o', tmp_path / 'print', program], check=True)
     name, mask, *gpios = json.loads(subprocess.run([tmp_path / 'print'], check=True, capture_output=True).stdout)

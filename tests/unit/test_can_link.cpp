@@ -150,7 +150,8 @@ TEST_F(CanLink, StateIsToldEveryFiftyMillisecondsAndAtOnceWhenItChanges) {
     told_.clear();
     board_host_run_us(200'000);
     exchange_frames();
-    const auto states = std::count_if(told_.begin(), told_.end(), [](auto& one) { return one.first == OLS_CANBUS_STATE; });
+    const auto states =
+        std::count_if(told_.begin(), told_.end(), [](auto& one) { return one.first == OLS_CANBUS_STATE; });
     EXPECT_TRUE(states == 3 || states == 4) << states;
     told_.clear();
     ASSERT_TRUE(load(program(18)).ok(OLS_LOAD_END));
@@ -182,7 +183,8 @@ TEST_F(CanLink, EachCycleIsToldInFourFramesAsItsDigestHasIt) {
             expected.push_back({id, bytes_of(ols_canbus_rise{low(rise), high(rise), uint16_t(n)})});
         expected.push_back({OLS_CANBUS_CYCLE_CRC, bytes_of(ols_canbus_cycle_crc{digest.cycle, digest.entries_crc32})});
     }
-    std::erase_if(told_, [](const auto& one) { return one.first == OLS_CANBUS_STATE || one.first == OLS_CANBUS_HEALTH; });
+    std::erase_if(told_,
+                  [](const auto& one) { return one.first == OLS_CANBUS_STATE || one.first == OLS_CANBUS_HEALTH; });
     EXPECT_EQ(told_, expected);
 }
 

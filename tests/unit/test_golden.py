@@ -51,6 +51,9 @@ MESSAGES = {
     'trigger_log_reply': (0x09 | REPLY, struct.pack('<IIIHH', 358, 360, 3, 2, 0) +
                           struct.pack('<QIIHBB', 20717472, 358, 1, 178, 1, 0) +
                           struct.pack('<QIIHBB', 20775342, 359, 1, 179, 3, 2)),
+    'read_digests': (0x0c, struct.pack('<IHH', 17, 31, 0)),
+    'digests_reply': (0x0c | REPLY, struct.pack('<IIIHH', 17, 19, 2, 1, 0) +
+                      struct.pack('<QQIIIHBB', 0x1_0000_0000, 0x1_009e_0fe8, 3060, 17, 0x363d6b0e, 180, 1, 1)),
     'clear_fault': (0x0a, b''),
     'swap': (0x0b, b''),
     'swap_reply': (0x0b | REPLY, struct.pack('<IB3x', 1234, 2)),

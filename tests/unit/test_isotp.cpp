@@ -109,8 +109,8 @@ TEST(Isotp, EveryLengthArrivesWholeForEveryBlockSize) {
 }
 
 TEST(Isotp, SeparationTimeIsKeptInMillisecondsAndInHundredsOfMicroseconds) {
-    const std::pair<uint8_t, uint64_t> codes[] = {{0x00, 0},    {0x01, 1000},   {0x7f, 127000}, {0xf1, 100},
-                                                  {0xf9, 900},  {0x80, 127000}, {0xf0, 127000}, {0xfa, 127000}};
+    const std::pair<uint8_t, uint64_t> codes[] = {{0x00, 0},   {0x01, 1000},   {0x7f, 127000}, {0xf1, 100},
+                                                  {0xf9, 900}, {0x80, 127000}, {0xf0, 127000}, {0xfa, 127000}};
     for (const auto& [code, us] : codes) {
         End end;
         ASSERT_TRUE(end.send(counting(30)));

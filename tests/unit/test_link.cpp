@@ -16,6 +16,7 @@ TEST_F(Link, hello_tells_layout_and_board) {
     EXPECT_EQ(hello.tick_hz, 125'000'000u);
     EXPECT_EQ(hello.chain_bits, 176);
     EXPECT_EQ(hello.slots_max, 1024);
+    EXPECT_STREQ(hello.board, "pico");
 }
 
 TEST_F(Link, hello_answers_a_host_of_another_layout_so_that_the_host_can_say_so) {

@@ -106,6 +106,14 @@ TEST(Wire, loading) {
     expect_golden("load_chunk", OLS_LOAD_CHUNK, join(ols_load_chunk{0}, program));
 }
 
+TEST(Wire, digests) {
+    expect_golden("read_digests", OLS_READ_DIGESTS, join(ols_read_digests{17, OLS_DIGESTS_MAX, 0}));
+    expect_golden(
+        "digests_reply", OLS_READ_DIGESTS | OLS_REPLY,
+        join(ols_digests_reply{17, 19, 2, 1, 0},
+             ols_cycle_digest{0x1'0000'0000, 0x1'009e'0fe8, 3060, 17, 0x363d6b0e, 180, 1, OLS_DIGEST_INCOMPLETE}));
+}
+
 TEST(Wire, arm) {
     expect_golden("arm", OLS_ARM, join(ols_arm{12500000, OLS_START_EACH_CYCLE_BY_EDGE, {}, 1250}));
 }

@@ -32,6 +32,10 @@ class EmulatedBus:
     def send(self, frame_id, data):
         self.socket.sendall(struct.pack("<IB3x8s", frame_id, len(data), bytes(data)))
 
+    def send_all(self, frame_id, datas):
+        """Hands all to the node's queue at once."""
+        self.socket.sendall(b"".join(struct.pack("<IB3x8s", frame_id, len(data), data) for data in datas))
+
     def break_next_frame(self):
         """Raises an error flag while the next frame is on the bus."""
         self.send(ERROR_FLAG, b"")

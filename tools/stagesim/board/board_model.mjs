@@ -43,9 +43,13 @@ export class Board {
   constructor(image, options) {
     this.#image = image;
     this.#options = options;
+<<<<<<< HEAD
     this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = [...options.injections];
+=======
+    this.#injections = options.injections.map((injection) => ({ ...injection }));
+>>>>>>> stops
     this.#logger = onceLogger(options.log);
     if (options.canBus) {
       if (options.pins.can === null) throw new Error(`board "${options.pins.name}" has no CAN controller`);
@@ -170,14 +174,18 @@ export class Board {
     if (levels === this.#levels) return;
     if (levels & ~this.#levels & this.#triggerMask) {
       this.#triggers++;
-      if (this.#injections.some(({ trigger }) => trigger <= this.#triggers)) this.#parts.lockstep.stop();
+      for (const injection of this.#injections) {
+        if (injection.trigger !== this.#triggers) continue;
+        injection.tick = tick + injection.delay;
+        this.#parts.lockstep.stop(); // for run() to look when it is due
+      }
     }
     this.#levels = levels;
     this.#options.onEdge(tick, levels);
   }
 
   #injectDue() {
-    const due = this.#injections.filter(({ tick, trigger }) => tick <= this.tick || trigger <= this.#triggers);
+    const due = this.#injections.filter(({ tick }) => tick <= this.tick);
     this.#injections = this.#injections.filter((injection) => !due.includes(injection));
     for (const { name, inject } of due) {
       this.#options.log(`injected at tick ${this.tick}: ${name}`);

@@ -29,20 +29,21 @@ const NUMBERS = { starve: { least: 0, below: [12] }, upset: { least: 1, below: [
                   flip: { least: 2, below: [0x20042000, 8] } };
 
 /**
- * @param {string} text FAULT[:NUMBER...]@TICK or FAULT[:NUMBER...]@trigger:N
- * @returns {{name: string, inject: (board: object) => void, tick: number, trigger: number}} the unused one Infinity
+ * @param {string} text FAULT[:NUMBER...]@TICK, FAULT[:NUMBER...]@trigger:N or the latter with +TICKS
+ * @returns {{name: string, inject: (board: object) => void, tick: number, trigger: number, delay: number}} of tick and
+ *   trigger, the unused one is Infinity; delay is in ticks after the trigger
  */
 export function parseInjection(text) {
-  const match = /^([a-z]+)((?::(?:0x[0-9a-f]+|\d+))*)@(?:(\d+)|trigger:(\d+))$/.exec(text);
+  const match = /^([a-z]+)((?::(?:0x[0-9a-f]+|\d+))*)@(?:(\d+)|trigger:(\d+)(?:\+(\d+))?)$/.exec(text);
   if (!match || !FAULTS[match[1]]) {
-    throw new Error(`--inject ${text}: write FAULT@TICK or FAULT@trigger:N with one of ${Object.keys(FAULTS).join(', ')}`);
+    throw new Error(`--inject ${text}: write FAULT@TICK or FAULT@trigger:N[+TICKS] with one of ${Object.keys(FAULTS).join(', ')}`);
   }
-  const [, name, list, tick, trigger] = match;
+  const [, name, list, tick, trigger, delay] = match;
   const numbers = list.split(':').slice(1).map(Number);
   const { least, below } = NUMBERS[name] ?? { least: 0, below: [] };
   if (numbers.length < least || numbers.length > below.length || numbers.some((number, n) => number >= below[n])) {
     throw new Error(`--inject ${text}: ${name} takes ${below.length} numbers, below ${below.join(' and ') || 'nothing'}`);
   }
   return { name, inject: (board) => FAULTS[name](board, ...numbers), tick: tick ? Number(tick) : Infinity,
-           trigger: trigger ? Number(trigger) : Infinity };
+           trigger: trigger ? Number(trigger) : Infinity, delay: Number(delay ?? 0) };
 }

@@ -30,7 +30,7 @@ export class Lockstep {
     this.#naive = naive;
     /** Cycles in which the processor was not asleep. */
     this.awakeCycles = 0;
-    this.handlerTimes = new HandlerTimes(chip.core);
+    this.handlerTimes = new HandlerTimes(chip.core, time);
     correctClock(chip.clock);
   }
 

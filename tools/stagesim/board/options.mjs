@@ -22,7 +22,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --cycles-limit N    end after N ticks of 8 ns
   --seed N            of the chip's random bits (default 1)
   --board-id HEX      the flash chip's unique number, 16 digits
-  --inject FAULT@WHEN WHEN is a tick, or trigger:N for the N-th rise of any trigger; may be given several times.
+  --inject FAULT@WHEN WHEN is a tick, or trigger:N or trigger:N+TICKS for the N-th rise of any trigger;
+                      may be given several times.
                       reset, watchdog, hardfault; hang: the main program stops, lockup: handlers, too; starve: DMA,
                       or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
                       suspend and busreset of USB; estop, overtemperature, openlamp pull that input low, release

@@ -84,8 +84,7 @@ export class UsbHost {
     if (this.#state === 'unplugged') return;
     this.#lose('unplugged');
     this.#controller.setPowered(false);
-    this.#suspendAlarm.cancel();
-    this.#suspendAlarm.schedule(SUSPEND_NS);
+    if (!this.#suspendAlarm.scheduled) this.#suspendAlarm.schedule(SUSPEND_NS);
   }
 
   /** Resets the bus and configures the device anew, as a host does that has lost patience with it. */

@@ -4,7 +4,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { starveDma } from '../dma.mjs';
-import { raiseHardFault } from '../processor.mjs';
+import { parseInjection } from '../injections.mjs';
+import { hangProgram, raiseHardFault } from '../processor.mjs';
 import { Cause, watchdogLegacy } from '../system.mjs';
 import { buildChip } from '../chip.mjs';
 import { Bench, PIO0, wrap } from './bench.mjs';
@@ -160,4 +161,36 @@ test('the watchdog bites once, after its time in half microseconds, and leaves i
   assert.equal(time.cycle, 1_000_000);
   const { reason, scratch } = watchdogLegacy(chip);
   assert.deepEqual([reason, scratch[3]], [1, 0x12345678]);
+});
+
+test('a program that hangs passes nothing any more, but its handlers run', () => {
+  const b = bench([ADDS_R7_1, 0xe7fd]); // counts for ever
+  b.run(50);
+  const before = passed(b);
+  hangProgram(b.chip);
+  b.chip.setInterrupt(TIMER0_IRQ, true);
+  b.run(5);
+  b.chip.setInterrupt(TIMER0_IRQ, false);
+  b.run(100);
+  assert.ok(before > 0 && passed(b) === before && handled(b) >= 1);
+});
+
+test('times of handlers are those from the interrupt to the entry, and to the return', () => {
+  const b = bench([CPSID, ADDS_R7_1, ADDS_R7_1, ADDS_R7_1, CPSIE, BRANCH_TO_SELF]);
+  b.run(1);
+  b.chip.setInterrupt(TIMER0_IRQ, true);
+  b.run(6);
+  b.chip.setInterrupt(TIMER0_IRQ, false);
+  b.run(100);
+  const { handlers, longestHeld } = b.lockstep.handlerTimes;
+  assert.equal(longestHeld, 4); // CPSID and three additions; CPSIE lets in
+  assert.deepEqual(handlers.get(16), { count: 1, wait: 4, longest: 15 + 1 });
+});
+
+test('an injection takes the numbers it needs, and no others', () => {
+  assert.equal(parseInjection('upset:17@trigger:5+300').delay, 300);
+  assert.equal(parseInjection('starve@7').tick, 7);
+  for (const text of ['upset@7', 'upset:32@7', 'flip:1@7', 'flip:0x20000000:8@7', 'estop:1@7', 'starve:12@7', 'x@1']) {
+    assert.throws(() => parseInjection(text), /--inject/, text);
+  }
 });

@@ -101,6 +101,20 @@ test('the trace has nanoseconds, initial values and one line for each change', (
   assert.equal(body.split('$end\n')[1], `#80\n1${id('TRIG0')}\n1${id('LIGHT_EN')}\n#200\n0${id('TRIG0')}\n#240\n`);
 });
 
+describe('boards', () => {
+  test('each has its pins, and a name that is none is answered with those there are', () => {
+    assert.equal(boardPins('feather_can').outputs.LIGHT_EN, 1);
+    assert.throws(() => boardPins('picco'), /no board "picco"; there are: feather_can, pico/);
+  });
+
+  test('no board drives the GPIO behind SYNC, which is a button on one of them', () => {
+    for (const name of ['pico', 'feather_can']) {
+      const { outputs, mask } = boardPins(name);
+      assert.equal((mask >> (outputs.SYNC + 1)) & 1, 0, name);
+    }
+  });
+});
+
 describe('images', () => {
   const write = (name, bytes) => {
     const path = join(directory, name);
@@ -128,6 +142,16 @@ describe('images', () => {
     const { pieces } = readImage(write('good.uf2', uf2(boot2)));
     assert.equal(pieces[0].address, 0x10000000);
     assert.deepEqual(Buffer.from(pieces[0].bytes), boot2);
+  });
+
+  test('an image says which board it is for by the label behind boot2 and two vectors, or not at all', () => {
+    assert.equal(readImage(write('silent.uf2', uf2(boot2))).label, null);
+    const page = Buffer.alloc(256);
+    page.write('OLab', 8);
+    page.write('feather_can', 8 + 16);
+    page.write('1.2.3', 8 + 32);
+    const labelled = Buffer.concat([uf2(boot2), uf2(page, { address: 0x10000100 })]);
+    assert.deepEqual(readImage(write('labelled.uf2', labelled)).label, { board: 'feather_can', version: '1.2.3' });
   });
 
   test('what cannot be started is refused with the file\'s name and the reason', () => {
