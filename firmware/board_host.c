@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Board on Linux: board.h, player.h, witness.h and the USB of usb.h without hardware. Time passes when the test says so, and
-// triggers fire at their scheduled ticks; what PIO makes of the words is not imitated here, but tested on its own.
+// Board on Linux: board.h, player.h, witness.h, receptor.h and the USB of usb.h without hardware. Time passes when the test
+// says so, and triggers fire at their scheduled ticks; what PIO makes of the words is not imitated here, but tested on its
+// own.
 #include "board_host.h"
 
 #include <stdlib.h>
@@ -13,6 +14,7 @@
 #include "link.h"
 #include "player.h"
 #include "pulse.h"
+#include "receptor.h"
 #include "schedule.h"
 #include "stage.h"
 #include "stop.h"
@@ -35,7 +37,9 @@ static struct {
     const struct sequence* following;  // from cycle following_from on; null when no swap is due
     uint32_t following_from;
     bool playing;
-    bool at_edge, waiting;  // for GENLOCK: armed so; started and not yet playing
+    enum ols_start_source start;
+    bool waiting;  // for GENLOCK
+    uint32_t edges, cycles_begun;
     uint64_t start_ticks;
     uint64_t next_rise_ticks;  // of next_slot, on the board's clock
     uint32_t next_slot, cycle;
@@ -98,12 +102,16 @@ static void play(void) {
         board.next_rise_ticks += slot->period_ticks;
         if (++board.next_slot < sequence->header.slot_count) continue;
         board.next_slot = 0;
+        if (board.start == OLS_START_EACH_CYCLE_BY_EDGE) {
+            board.playing = false;
+            board.waiting = true;
+        }
         if (++board.cycle == board.following_from && board.following) {
             board.armed = (struct sequence*)board.following;
             board.following = NULL;
             board.cycle = 0;
         } else if (board.cycle == sequence->header.cycles) {
-            board.playing = false;
+            board.playing = board.waiting = false;
             board.events |= PLAYER_DONE;
         }
     }
@@ -235,8 +243,9 @@ uint32_t board_boot_nonce(void) {
 
 // player.h and witness.h
 
-bool player_arm(const struct sequence* sequence, bool at_edge) {
-    board.at_edge = at_edge;
+bool player_arm(const struct sequence* sequence, enum ols_start_source start) {
+    board.start = start;
+    board.next_slot = board.cycle = board.cycles_begun = 0;
     board.armed = (struct sequence*)sequence;  // board_host_corrupt_program writes through it
     board.events = 0;
     stop_connect_pins(0);
@@ -245,17 +254,21 @@ bool player_arm(const struct sequence* sequence, bool at_edge) {
     return false;
 }
 
-static void begin_play(void) {
+static void begin_cycle(void) {
     board.waiting = false;
     board.playing = true;
-    board.start_ticks = now_ticks();
+    board.cycles_begun++;
+    if (board.cycle == 0) board.start_ticks = now_ticks();
     board.next_rise_ticks = now_ticks() + SLOT_LATCH_TICKS;
-    board.next_slot = board.cycle = 0;
 }
 
 void player_start(void) {
-    board.waiting = board.at_edge;
-    if (!board.waiting) begin_play();
+    board.waiting = board.start != OLS_START_BY_COMMAND;
+    if (!board.waiting) begin_cycle();
+}
+
+uint32_t player_cycles_begun(void) {
+    return board.cycles_begun;
 }
 
 bool player_waiting(void) {
@@ -263,7 +276,8 @@ bool player_waiting(void) {
 }
 
 void board_host_genlock(void) {
-    if (board.waiting) begin_play();
+    board.edges++;
+    if (board.waiting) begin_cycle();
 }
 
 uint32_t player_events(void) {
@@ -294,8 +308,8 @@ void player_stop(void) {
     board.events = 0;
 }
 
-void witness_arm(bool at_edge) {
-    (void)at_edge;  // play() stamps from the start of play on
+void witness_arm(enum ols_start_source start) {
+    (void)start;  // play() stamps from the start of play on
     board.stamp_count = 0;
 }
 
@@ -309,6 +323,25 @@ uint32_t witness_count(void) {
 
 uint32_t witness_stamp(uint32_t n) {
     return board.stamps[n % WITNESS_RING_STAMPS];
+}
+
+// receptor.h
+
+void receptor_arm(uint32_t debounce_ticks) {
+    (void)debounce_ticks;  // board_host_genlock's rises are debounced
+    board.edges = 0;
+}
+
+void receptor_start(void) {
+    // Counts from player_start on, which is the same moment here.
+}
+
+void receptor_stop(void) {
+    // What has been counted stays.
+}
+
+uint32_t receptor_edges(void) {
+    return board.edges;
 }
 
 // light_watch.h

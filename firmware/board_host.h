@@ -36,7 +36,7 @@ void board_host_corrupt_program(void);
 // A light of so many ticks at LIGHT_EN's pad, whatever the program says.
 void board_host_hold_light(uint32_t ticks);
 
-// A rise of GENLOCK.
+// A rise of GENLOCK that debouncing lets through.
 void board_host_genlock(void);
 
 // Pulls a stop input low (enum board_stop_input), or lets go of it.

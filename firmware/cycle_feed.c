@@ -43,3 +43,7 @@ void cycle_feed_stop(const struct cycle_feed* feed) {
 uint32_t cycle_feed_begun(const struct cycle_feed* feed) {
     return (DMA_READ_ADDR(feed->address_channel) - (uint32_t)feed->tables) / 4 % CYCLE_FEED_RING;
 }
+
+uint32_t cycle_feed_next_word(const struct cycle_feed* feed) {
+    return DMA_READ_ADDR(feed->table_channel);
+}

@@ -33,4 +33,7 @@ void cycle_feed_stop(const struct cycle_feed* feed);
 // for the first ones, which fill the FIFO; what is in the FIFO (8 words) is still to be played.
 uint32_t cycle_feed_begun(const struct cycle_feed* feed);
 
+// Address of the word that the FIFO takes next.
+uint32_t cycle_feed_next_word(const struct cycle_feed* feed);
+
 #endif

@@ -18,7 +18,8 @@ enum events_pins {
     PIN_LATCH = 1 << 0,
     PIN_LIGHT_EN = 1 << 1,
     PIN_TRIG_SHIFT = 2,  // TRIGn is bit n above this
-    PIN_SYNC = 1 << 6
+    PIN_SYNC = 1 << 6,
+    PIN_READY = 1 << 7  // waits for an edge
 };
 
 // The shortest that any event may last: two edges coincide or are this far apart.

@@ -63,7 +63,7 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
                                       .boot_nonce = board_boot_nonce(),
                                       .tick_hz = BOARD_TICK_HZ,
                                       .capabilities = OLS_CAN_OFFSET_TRIGGERS | OLS_CAN_SWAP | OLS_CAN_START_BY_EDGE |
-                                                      OLS_CAN_GREY | OLS_CAN_DIGEST |
+                                                      OLS_CAN_GREY | OLS_CAN_CYCLE_BY_EDGE | OLS_CAN_DIGEST |
                                                       (can_is_there() ? OLS_CAN_SPEAK_CAN : 0),
                                       .chain_bits = BOARD_CHAIN_BITS,
                                       .slots_max = OLS_SLOTS_MAX,
@@ -72,6 +72,7 @@ static void answer_hello(const struct ols_frame* request, struct reply* reply) {
                                       .lamps_lit_max = board_sequence.limits.lamps_lit_max,
                                       .lamp_duty_max_permille = board_sequence.limits.lamp_duty_max_permille,
                                       .edge_start_ticks = TIMELINE_EDGE_START_TICKS,
+                                      .cycle_edge_ticks = RECEPTOR_DELAY_TICKS + TIMELINE_EDGE_START_TICKS,
                                       .board = BOARD_NAME};
     board_read_id(hello->board_id);
     reply->payload_bytes = sizeof *hello;

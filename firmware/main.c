@@ -7,6 +7,7 @@
 #include "interrupts.h"
 #include "link.h"
 #include "player.h"
+#include "receptor.h"
 #include "stage.h"
 #include "usb.h"
 #include "witness.h"
@@ -15,6 +16,7 @@ int main(void) {
     board_init();
     player_init();
     witness_init();
+    receptor_init();
     fault_init();
     stage_init();
     usb_init();

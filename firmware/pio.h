@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What player and witness both do to a PIO state machine.
+// What player, witness and receptor do to a PIO state machine.
 #ifndef OLS_PIO_H
 #define OLS_PIO_H
 
@@ -22,6 +22,13 @@ static inline void pio_load(uint32_t block, uint32_t origin, const uint16_t* pro
 
 static inline void pio_execute(struct pio_machine m, uint32_t instruction) {
     PIO_SM_INSTR(m.block, m.machine) = instruction;
+}
+
+// Loads a scratch register through the FIFO; the machine must be stopped and its FIFO empty.
+static inline void pio_set_scratch(struct pio_machine m, uint32_t value, uint32_t mov_from_osr) {
+    PIO_TXF(m.block, m.machine) = value;
+    pio_execute(m, PIO_PULL);
+    pio_execute(m, mov_from_osr);
 }
 
 // Stops the machine, empties its FIFOs (changing FJOIN does, datasheet 3.7 SM0_SHIFTCTRL) and forgets its state.

@@ -6,6 +6,7 @@
 
 #include "board.h"
 #include "cycle_feed.h"
+#include "events.h"
 #include "pio.h"
 #include "pulse.h"
 #include "schedule.h"
@@ -13,9 +14,11 @@
 
 enum { SHIFTER_ORIGIN = TIMELINE_WORDS, GUARD_ORIGIN = SHIFTER_ORIGIN + SHIFTER_WORDS };
 enum { FLAG_SEND = 4, FLAG_SENT = 5, FLAGS_ALL = 0xff, FLAGS_FOR_PROCESSOR = 7 };
+enum { READY_BIT = 7 };            // of the timeline's pins
 enum { SHIFT_TIMEOUT_US = 1000 };  // 40 times what a chain of 256 bits takes
 _Static_assert(GUARD_ORIGIN + GUARD_WORDS <= 32, "all programs fit the block's instruction memory");
 _Static_assert(TIMELINE_HALT == 0, "a starved FIFO jumps to the word 0");
+_Static_assert(PIN_READY == 1 << READY_BIT, "READY is where the words for a wait have it");
 
 static const struct pio_machine timeline = {PIO0_BASE, 0};
 static const struct pio_machine shifter = {PIO0_BASE, 1};
@@ -37,6 +40,7 @@ static const struct cycle_feed shifter_feed = {{PIO0_BASE, 1}, DMA_REQUEST_PIO0_
                                                shifter_counts, shifter_tables};
 
 static const struct sequence* playing;
+static enum ols_start_source started_by;
 static uint32_t playing_from;        // cycle of the feeds, since arm, in which `playing` began
 static uint32_t begun;               // cycles begun by the feed that is ahead, since arm
 static const struct sequence* next;  // follows from cycle next_from on; null when no swap is under way
@@ -52,8 +56,6 @@ void player_init(void) {
 
     PIO_SM_CLKDIV(PIO0_BASE, timeline.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO0_BASE, timeline.machine) = PIO_EXEC_WRAP(TIMELINE_WRAP_TARGET, TIMELINE_WRAP);
-    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) = PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_IN(BOARD_PIN_GENLOCK);
-
     PIO_SM_CLKDIV(PIO0_BASE, shifter.machine) = PIO_CLKDIV(BOARD_SHIFT_DIVIDER);
     PIO_SM_EXECCTRL(PIO0_BASE, shifter.machine) =
         PIO_EXEC_WRAP(SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET, SHIFTER_ORIGIN + SHIFTER_WRAP) |
@@ -71,19 +73,13 @@ void player_init(void) {
     player_stop();
 }
 
-// Gives every cycle in first..end-1 to the sequence.
+// Gives every cycle in first..end-1 to the sequence; each ends with the wait for the next one's edge where it has one.
 static void set_cycles(const struct sequence* sequence, uint32_t first, uint32_t end) {
+    const uint32_t waits = started_by == OLS_START_EACH_CYCLE_BY_EDGE;
     for (uint32_t n = first; n != end; n++) {
-        cycle_feed_set(&timeline_feed, n, sequence_enter(sequence) + 1, sequence->cycle_words);
+        cycle_feed_set(&timeline_feed, n, sequence_enter(sequence) + 1, sequence->cycle_words + waits);
         cycle_feed_set(&shifter_feed, n, sequence_patterns(sequence), sequence_patterns_words(sequence));
     }
-}
-
-// Loads a scratch register through the FIFO; the machine must be stopped and its FIFO empty.
-static void set_scratch(struct pio_machine machine, uint32_t value, uint32_t mov_from_osr) {
-    PIO_TXF(machine.block, machine.machine) = value;
-    pio_execute(machine, PIO_PULL);
-    pio_execute(machine, mov_from_osr);
 }
 
 static bool send_first_pattern(void) {
@@ -102,14 +98,18 @@ static uint8_t inverted_triggers(const struct sequence* sequence) {
     return (uint8_t)inverted;
 }
 
-bool player_arm(const struct sequence* sequence, bool at_edge) {
+bool player_arm(const struct sequence* sequence, enum ols_start_source start) {
     player_stop();
+    const uint32_t edge_pin = start == OLS_START_EACH_CYCLE_BY_EDGE ? BOARD_PIN_PHOTO : BOARD_PIN_GENLOCK;
+    PIO_SM_PINCTRL(PIO0_BASE, timeline.machine) =
+        PIO_PINS_OUT(BOARD_PIN_TIMELINE, 8) | PIO_PINS_SET(BOARD_PIN_TIMELINE + READY_BIT, 1) | PIO_PINS_IN(edge_pin);
     playing = sequence;
+    started_by = start;
     playing_from = begun = 0;
     set_cycles(sequence, 0, CYCLE_FEED_RING);
-    set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
-    set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
-    pio_execute(timeline, PIO_JMP | (at_edge ? TIMELINE_GENLOCK : TIMELINE_NEXT));
+    pio_set_scratch(timeline, sequence->header.cycles - 1, PIO_MOV_Y_OSR);
+    pio_set_scratch(shifter, BOARD_CHAIN_BITS - 1u, PIO_MOV_ISR_OSR);
+    pio_execute(timeline, PIO_JMP | (start == OLS_START_BY_COMMAND ? TIMELINE_NEXT : TIMELINE_GENLOCK));
     pio_execute(shifter, PIO_JMP | (SHIFTER_ORIGIN + SHIFTER_WRAP_TARGET));
     for (uint32_t n = 0; n < 2; n++) pio_execute(guards[n], PIO_JMP | GUARD_ORIGIN);
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(guards[0].machine) | PIO_CTRL_ENABLE(guards[1].machine);
@@ -122,6 +122,8 @@ bool player_arm(const struct sequence* sequence, bool at_edge) {
 }
 
 void player_start(void) {
+    if (started_by != OLS_START_BY_COMMAND)
+        pio_execute(timeline, PIO_SET_PINS | 1);  // READY, as the later waits have it
     REGISTER_SET(PIO_CTRL(PIO0_BASE)) = PIO_CTRL_ENABLE(timeline.machine);
 }
 
@@ -140,6 +142,20 @@ static uint32_t new_cycles(const struct cycle_feed* feed) {
 static void count_cycles(void) {
     const uint32_t timeline_new = new_cycles(&timeline_feed), shifter_new = new_cycles(&shifter_feed);
     begun += timeline_new > shifter_new ? timeline_new : shifter_new;
+}
+
+uint32_t player_cycles_begun(void) {
+    const uint32_t cycle_words = playing->cycle_words + 1;  // with the wait for the next cycle's edge
+    uint32_t fed, next_word, queued;
+    do {
+        next_word = cycle_feed_next_word(&timeline_feed);
+        count_cycles();
+        fed = begun - (begun - cycle_feed_begun(&timeline_feed)) % CYCLE_FEED_RING;
+        queued = PIO_TX_LEVEL(PIO0_BASE, timeline.machine);
+    } while (next_word != cycle_feed_next_word(&timeline_feed));
+    // Of the cycles that are fed, those have not begun of which no word has been taken from the FIFO.
+    const uint32_t to_come = cycle_words - (next_word - (uint32_t)(sequence_enter(playing) + 1)) / 4;
+    return fed - (to_come + queued) / cycle_words;
 }
 
 static bool feed_is_past(const struct cycle_feed* feed, uint32_t cycle) {

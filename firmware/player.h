@@ -16,14 +16,18 @@ enum player_event { PLAYER_TIMELINE_STARVED = 1 << 0, PLAYER_DONE = 1 << 1, PLAY
 void player_init(void);
 
 // Fills the FIFOs, connects the pins and sends the first pattern. `sequence` must stay as it is until player_stop.
-// False, with the pins dark, when the chain could not be filled. After stop_guard: what has stopped is not connected. `at_edge`: play begins not with player_start but with
-// the first rise of GENLOCK after it.
-bool player_arm(const struct sequence* sequence, bool at_edge);
+// False, with the pins dark, when the chain could not be filled. After stop_guard: what has stopped is not connected. By an
+// edge: play begins not with player_start but with the first rise of GENLOCK after it; each cycle by an edge: and every
+// cycle with a rise of PHOTO of its own (receptor.h).
+bool player_arm(const struct sequence* sequence, enum ols_start_source start);
 
 // Starts the timeline: the first event plays within a few ticks.
 void player_start(void);
 
-// True until the edge has come, of a start at an edge.
+// Cycles that an edge has begun since player_arm, where each cycle waits for one: exact, some ticks after the edge.
+uint32_t player_cycles_begun(void);
+
+// True while the timeline waits for an edge.
 bool player_waiting(void);
 
 // Goes on with `following` at the end of a cycle: the first that can be changed in time, which is the cycle after the

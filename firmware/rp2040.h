@@ -102,6 +102,7 @@ enum {
     GPIO_FUNCTION_SPI = 1,
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
+    GPIO_FUNCTION_PIO1 = 7,
     GPIO_FUNCTION_NONE = 31,
     GPIO_OUTPUT_INVERTED = 1 << 8,
     GPIO_OUTPUT_LOW = 2 << 8,
@@ -143,6 +144,7 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO0_BASE 0x50200000
 #define PIO1_BASE 0x50300000
 #define PIO_CTRL(base) ((base) + 0x000)
+#define PIO_TX_LEVEL(base, machine) (REGISTER((base) + 0x00c) >> 8 * (machine)&15)  // words in the FIFO
 #define PIO_TXF(base, machine) REGISTER((base) + 0x010 + 4 * (machine))
 #define PIO_RXF(base, machine) REGISTER((base) + 0x020 + 4 * (machine))
 #define PIO_IRQ(base) REGISTER((base) + 0x030)
@@ -168,6 +170,7 @@ enum { BUS_PRIORITY_DMA = 1 << 8 | 1 << 12 };
 #define PIO_SHIFT_OUT_RIGHT (1u << 19)
 #define PIO_PINS_OUT(base, count) ((uint32_t)(count) << 20 | (uint32_t)(base))
 #define PIO_PINS_IN(base) ((uint32_t)(base) << 15)
+#define PIO_PINS_SET(base, count) ((uint32_t)(count) << 26 | (uint32_t)(base) << 5)
 #define PIO_PINS_SIDE(base, count) ((uint32_t)(count) << 29 | (uint32_t)(base) << 10)
 // Instructions that the processor executes on a machine (3.4)
 enum {
@@ -176,7 +179,8 @@ enum {
     PIO_MOV_PINS_NULL = 0xa003,  // with side-set 0 where the machine has one
     PIO_MOV_Y_OSR = 0xa047,
     PIO_MOV_X_ONES = 0xa02b,  // mov x, ~null
-    PIO_MOV_ISR_OSR = 0xa0c7
+    PIO_MOV_ISR_OSR = 0xa0c7,
+    PIO_SET_PINS = 0xe000  // | value
 };
 
 // DMA (2.5.7)
@@ -201,6 +205,7 @@ enum {
     DMA_REQUEST_PIO0_TX0 = 0,
     DMA_REQUEST_PIO0_TX1 = 1,
     DMA_REQUEST_PIO1_RX0 = 12,
+    DMA_REQUEST_PIO1_RX2 = 14,
     DMA_REQUEST_NONE = 0x3f
 };
 

@@ -17,6 +17,7 @@ struct search {
     uint64_t light_ticks;  // of that slot, since the first light of all
     bool is_due;           // a trigger follows
     uint64_t due_ticks;    // its rise
+    uint32_t due_cycle;    // and the cycle it is in
     uint64_t vain_ticks;   // that the last search in vain has passed: a cycle
 };
 
@@ -25,6 +26,8 @@ static struct search* volatile search = searches;  // the one in use
 static volatile uint32_t taken;
 static uint32_t origin_ticks;  // what the first stamp says less when that trigger was due, modulo 2^32
 static uint64_t last_ticks;    // when the last trigger taken was due
+static uint32_t last_cycle;    // and the cycle it was in
+static bool each_cycle_waits;  // for an edge, so that its first trigger comes whenever that did
 
 static void take_following(struct search* s) {
     s->played = s->following;
@@ -54,6 +57,7 @@ static void seek(struct search* s) {
         const struct ols_slot* const slot = &sequence_slots(s->played)[s->slot];
         if (fires(s->played, slot)) {
             s->due_ticks = s->light_ticks + (uint64_t)sequence_trigger_offset_ticks(s->played, slot, 0);
+            s->due_cycle = s->cycle;
             s->is_due = true;
             return step_slot(s);
         }
@@ -78,8 +82,13 @@ static bool waits_for_swap(const struct search* s) {
     return !s->is_due && s->following != NULL;
 }
 
-void schedule_begin(const struct sequence* sequence) {
+static bool is_whenever_an_edge_comes(const struct search* s) {
+    return each_cycle_waits && s->due_cycle != last_cycle;
+}
+
+void schedule_begin(const struct sequence* sequence, bool cycles_wait) {
     *search = (struct search){.played = sequence};
+    each_cycle_waits = cycles_wait;
     taken = 0;
     seek(search);
 }
@@ -110,9 +119,10 @@ bool schedule_take(uint32_t stamp) {
     if (!s->is_due) return false;
     const uint32_t rise_ticks = ~stamp * WITNESS_COUNT_TICKS;
     const uint32_t due_ticks = (uint32_t)s->due_ticks;
-    if (taken == 0) origin_ticks = rise_ticks - due_ticks;
+    if (taken == 0 || is_whenever_an_edge_comes(s)) origin_ticks = rise_ticks - due_ticks;
     taken++;
     last_ticks = s->due_ticks;
+    last_cycle = s->due_cycle;
     const int32_t slip_ticks = (int32_t)(rise_ticks - origin_ticks - due_ticks);
     return slip_ticks <= SCHEDULE_TOLERANCE_TICKS && slip_ticks >= -SCHEDULE_TOLERANCE_TICKS;
 }
@@ -123,6 +133,7 @@ void schedule_seek(void) {
 
 uint32_t schedule_ticks_to_next(void) {
     const struct search* const s = search;
+    if (!s->is_due || is_whenever_an_edge_comes(s)) return 0;
     const uint64_t ticks = s->due_ticks - last_ticks;
-    return s->is_due && ticks < UINT32_MAX ? (uint32_t)ticks : 0;
+    return ticks < UINT32_MAX ? (uint32_t)ticks : 0;
 }

@@ -16,8 +16,9 @@ extern "C" {
 // Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser.
 enum { SCHEDULE_TOLERANCE_TICKS = 3 };
 
-// A new start of `sequence`, before its first trigger. It must stay as it is while it plays.
-void schedule_begin(const struct sequence* sequence);
+// A new start of `sequence`, before its first trigger. It must stay as it is while it plays. `cycles_wait`: each cycle begins
+// whenever an edge comes, so only the triggers within a cycle have a schedule; no swap then.
+void schedule_begin(const struct sequence* sequence, bool cycles_wait);
 
 // After `after_cycles` of the sequence so far the next one plays. A few instructions, to be run before the last but one of
 // those cycles begins: by then no trigger after them has been looked for.
@@ -30,14 +31,14 @@ void schedule_settle(void);
 uint32_t schedule_taken(void);
 
 // Takes the witness's next stamp. False when the program has no trigger there, to the tolerance, counted from the first
-// trigger.
+// trigger, or from the first of its cycle where cycles wait.
 bool schedule_take(uint32_t stamp);
 
 // After each stamp taken: searches the slots up to the next trigger. That takes some 40 instructions a slot, and so less
 // time than the slots do.
 void schedule_seek(void);
 
-// Ticks from the last trigger taken to the next; 0 when none follows, or none within half a minute.
+// Ticks from the last trigger taken to the next; 0 when none follows, or none within half a minute, or it waits for an edge.
 uint32_t schedule_ticks_to_next(void);
 
 #ifdef __cplusplus

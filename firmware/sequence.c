@@ -138,7 +138,7 @@ static bool check_length(const struct sequence* sequence, struct ols_error_reply
     const uint32_t program_bytes = slots_bytes + patterns * sequence->pattern_words * 4;
     if (header->program_bytes != program_bytes)
         return reject(error, OLS_NO_SLOT, "a program of such slots has ", program_bytes, " bytes");
-    if (program_bytes / 4 >= SEQUENCE_WORDS_MAX)
+    if (program_bytes / 4 >= SEQUENCE_WORDS_MAX - 1)
         return reject(error, OLS_NO_SLOT, "the program is longer than the board's ", 4 * SEQUENCE_WORDS_MAX,
                       " bytes: send fewer slots");
     return true;
@@ -270,7 +270,7 @@ static bool begin_cycle(struct sequence_compiler* compiler) {
     *enter = TIMELINE_ENTER << 8 | (header->cycles - 1) << 13;
     for (unsigned n = 0; n < OLS_TRIGGERS; n++)
         compiler->triggers[n].light_ticks = (uint64_t)header->lead_ticks + SLOT_LATCH_TICKS;
-    const uint32_t words_max = SEQUENCE_WORDS_MAX - header->program_bytes / 4 - 1;
+    const uint32_t words_max = SEQUENCE_WORDS_MAX - header->program_bytes / 4 - 2;  // before and after the cycle
     events_begin(&compiler->events, enter + 1, words_max, next_pulse, compiler);
     if (header->lead_ticks > 0) events_play(&compiler->events, 0, TIMELINE_HOLD, header->lead_ticks);
     return !compiler->refused;
@@ -285,8 +285,10 @@ static bool end_cycle(struct sequence_compiler* compiler) {
                           " ends after the cycle: end the cycle with a longer slot");
     // SYNC is low here even in a cycle of one slot, so that each cycle has its rising edge.
     events_play(events, 0, header->cycles == 0 ? TIMELINE_HOLD : TIMELINE_CYCLE_END, SLOT_CYCLE_END_TICKS);
+    if (!events_are_fine(compiler, (uint16_t)(header->slot_count - 1))) return false;
     compiler->sequence->cycle_words = events->word_count;
-    return events_are_fine(compiler, (uint16_t)(header->slot_count - 1)) && check_duty(compiler);
+    events->words[events->word_count] = PIN_READY | TIMELINE_GENLOCK << 8;
+    return check_duty(compiler);
 }
 
 static bool check_next_slot(struct sequence_compiler* compiler) {

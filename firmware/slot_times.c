@@ -13,7 +13,7 @@ uint16_t slot_pattern_words(uint16_t chain_bits) {
 
 uint32_t slot_shift_ticks(const struct sequence_board* board) {
     // One divided tick more, for the phase of the shifter's clock.
-    const uint32_t shifter_ticks = SHIFTER_START_TICKS + SHIFTER_BIT_TICKS * board->chain_bits +
+    const uint32_t shifter_ticks = SHIFTER_START_TICKS + (SHIFTER_LOW_TICKS + SHIFTER_HIGH_TICKS) * board->chain_bits +
                                    SHIFTER_WORD_TICKS * slot_pattern_words(board->chain_bits) + 1;
     return TIMELINE_SHIFT_DELAY_TICKS + board->shift_divider * shifter_ticks;
 }

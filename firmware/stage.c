@@ -10,6 +10,7 @@
 #include "frame.h"
 #include "light_watch.h"
 #include "player.h"
+#include "receptor.h"
 #include "schedule.h"
 #include "sequence.h"
 #include "stop.h"
@@ -37,11 +38,12 @@ static struct check checked;    // for a request
 static struct check rechecked;  // of the playing sequence, again and again
 static uint64_t start_us;
 static uint32_t stamps_read;
-static uint32_t cycles_of_done;   // of the program that has played to its end
-static bool at_edge;              // GENLOCK starts, not the command alone
-static uint32_t heartbeat_us;     // 0: the host may be silent
-static uint8_t programs_swapped;  // since start
-static bool leaving;              // for the boot loader
+static uint32_t cycles_of_done;  // of the program that has played to its end
+static enum ols_start_source started_by;
+static uint32_t edges_seen, edges_missed;  // since start, where each cycle waits for one
+static uint32_t heartbeat_us;              // 0: the host may be silent
+static uint8_t programs_swapped;           // since start
+static bool leaving;                       // for the boot loader
 
 static bool refuse(struct ols_error_reply* error, enum ols_error_code code, const char* reason) {
     error->code = (uint16_t)code;
@@ -64,7 +66,7 @@ static uint64_t ticks_since_start(void) {
 }
 
 static uint32_t sequence_bytes(const struct sequence* sequence) {
-    return sequence->header.program_bytes + 4 * (1 + sequence->cycle_words);
+    return sequence->header.program_bytes + 4 * (2 + sequence->cycle_words);
 }
 
 // Goes on with the CRC of a sequence's words; true when it is complete. All at once would take half of the watchdog's
@@ -101,11 +103,28 @@ static void take_next(void) {
     next = OLS_NEXT_NONE;
 }
 
+// Each edge begins a cycle, or came while one played and is missed.
+static void count_edges(void) {
+    if (started_by != OLS_START_EACH_CYCLE_BY_EDGE) return;
+    uint32_t cycles;
+    do {
+        cycles = player_cycles_begun();
+        edges_seen = receptor_edges();
+    } while (cycles != player_cycles_begun());  // once a cycle: they were of different moments
+    edges_missed = edges_seen - cycles;
+}
+
+// While the player still knows its cycles.
+static void stop_receptor(void) {
+    receptor_stop();
+    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+}
+
 void stage_init(void) {
     leaving = false;
     stop_unguard();
     forget_programs();
-    trigger_log_begin(current);
+    trigger_log_begin(current, false);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;
 }
 
@@ -124,6 +143,7 @@ static bool read_witness(void) {
 
 static void latch(struct stop stop) {
     const bool playing = state == OLS_STATE_PLAYING;
+    stop_receptor();
     if (playing) read_witness();
     fault_latch(stop.cause, trigger_log_slot(),
                 playing && stop.us > start_us ? (stop.us - start_us) * BOARD_TICKS_PER_US : 0);
@@ -148,6 +168,7 @@ static bool end_play(enum ols_state ended) {
         return false;
     }
     board_expect_message(0);
+    stop_receptor();
     player_stop();
     fault_note_idle();
     if (next == OLS_NEXT_READY || next == OLS_NEXT_SWAPPING) take_next();
@@ -215,7 +236,9 @@ void stage_poll(bool host_is_there) {
         if (cause != OLS_FAULT_NONE) return end_in_fault(cause);
         if (stop_seen() != OLS_FAULT_NONE) return end_in_fault(stop_seen());
     }
-    if (state == OLS_STATE_WAITING && !player_waiting()) begin_play();
+    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+    // A cycle may be over, and the next one waited for, before this turn could see it play.
+    if (state == OLS_STATE_WAITING && (edges_seen > 0 || !player_waiting())) begin_play();
     if (state == OLS_STATE_PLAYING) follow_play();
 }
 
@@ -299,8 +322,15 @@ void stage_begin_request(bool from_owner) {
 static bool arm_is_valid(const struct ols_arm* arm, struct ols_error_reply* error) {
     if (arm->heartbeat_ticks != 0 && arm->heartbeat_ticks < OLS_HEARTBEAT_TICKS_MIN)
         return refuse(error, OLS_ERROR_BAD_PROGRAM, "a heartbeat of less than 5 ms cannot be kept: choose more, or 0");
-    return (arm->start_source <= OLS_START_BY_EDGE && !arm->reserved[0] && !arm->reserved[1] && !arm->reserved[2]) ||
-           refuse(error, OLS_ERROR_BAD_PROGRAM, "start_source is 0 (command) or 1 (edge), reserved fields are 0");
+    if (arm->start_source > OLS_START_EACH_CYCLE_BY_EDGE || arm->reserved[0] || arm->reserved[1] || arm->reserved[2])
+        return refuse(error, OLS_ERROR_BAD_PROGRAM,
+                      "start_source is 0 (command), 1 (edge) or 2 (edges); reserved is 0");
+    const bool debounces = arm->start_source == OLS_START_EACH_CYCLE_BY_EDGE;
+    const bool debounce_is_valid = debounces
+                                       ? arm->debounce_ticks >= OLS_DEBOUNCE_TICKS_MIN && arm->debounce_ticks % 2 == 0
+                                       : arm->debounce_ticks == 0;
+    return debounce_is_valid ||
+           refuse(error, OLS_ERROR_BAD_PROGRAM, "debounce_ticks is even and 4 at least with start_source 2, else 0");
 }
 
 // What must be so before anything may be lit.
@@ -329,15 +359,18 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
         stop_unguard();
         return STAGE_REFUSED;
     }
-    trigger_log_begin(current);
-    schedule_begin(current);
+    started_by = arm->start_source;
+    const bool cycles_wait = started_by == OLS_START_EACH_CYCLE_BY_EDGE;
+    trigger_log_begin(current, cycles_wait);
+    schedule_begin(current, cycles_wait);
     programs_swapped = 0;
     stamps_read = 0;
-    at_edge = arm->start_source == OLS_START_BY_EDGE;
-    witness_arm(at_edge);
+    edges_seen = edges_missed = 0;
+    witness_arm(started_by);
+    if (cycles_wait) receptor_arm(arm->debounce_ticks);
     light_watch_arm(current->longest_light_ticks);
     rechecked = (struct check){0};
-    if (!player_arm(current, at_edge)) {
+    if (!player_arm(current, started_by)) {
         end_in_fault(OLS_FAULT_SHIFTER_STARVED);
         refuse_fault(error);
         return STAGE_REFUSED;
@@ -353,7 +386,8 @@ bool stage_start(struct ols_error_reply* error) {
     begin_play();
     witness_start();
     player_start();
-    if (at_edge) state = OLS_STATE_WAITING;
+    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) receptor_start();
+    if (started_by != OLS_START_BY_COMMAND) state = OLS_STATE_WAITING;
     return true;
 }
 
@@ -379,6 +413,10 @@ static bool next_fits(struct ols_error_reply* error) {
 enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_reply* error) {
     if (state != OLS_STATE_PLAYING || next != OLS_NEXT_READY) {
         refuse_state(error, "nothing to swap: load the next program while one is playing");
+        return STAGE_REFUSED;
+    }
+    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) {
+        refuse_state(error, "cycles that wait for edges are not swapped: stop, and arm the next program");
         return STAGE_REFUSED;
     }
     if (!check_words(&checked, spare, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
@@ -441,5 +479,7 @@ void stage_status(struct ols_status_reply* status) {
                                         .cycles_played = cycles_played(),
                                         .log_entries_lost = trigger_log_lost(),
                                         .program_crc32 = current->header.program_crc32,
-                                        .next = (uint8_t)next};
+                                        .next = (uint8_t)next,
+                                        .edges_seen = edges_seen,
+                                        .edges_missed = edges_missed};
 }

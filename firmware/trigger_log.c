@@ -36,9 +36,11 @@ static uint32_t cycle;            // of next_slot
 static uint64_t scheduled_ticks;  // light of next_slot since the light of slot 0 of cycle 0
 static struct kept last;
 static int64_t first_error_ticks;  // measured minus scheduled of the first trigger: where start is on the schedule
+static bool cycles_wait;           // so that every cycle has its own first trigger
 
-void trigger_log_begin(const struct sequence* sequence) {
+void trigger_log_begin(const struct sequence* sequence, bool wait) {
     played = sequence;
+    cycles_wait = wait;
     next_played = NULL;
     oldest = fired = read_to = lost = next_slot = cycle = program = 0;
     scheduled_ticks = 0;
@@ -102,6 +104,7 @@ static struct ols_trigger_log_entry entry_of(uint32_t counter) {
 bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
     if (!find_slot()) return false;
     if (fired - oldest == LOG_ENTRIES && oldest++ >= read_to) lost++;
+    const bool is_first = fired == 0 || (cycles_wait && cycle != last.cycle);
     last = (struct kept){.rise_ticks = rise_from_stamp(stamp, now_ticks),
                          .cycle = cycle,
                          .slot = (uint16_t)next_slot,
@@ -112,9 +115,10 @@ bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
     cycle_digest_add(&entry);
     const int64_t offset_ticks = sequence_trigger_offset_ticks(played, &sequence_slots(played)[next_slot], 0);
     const int64_t error_ticks = (int64_t)last.rise_ticks - (int64_t)scheduled_ticks - offset_ticks;
-    if (fired == 0) first_error_ticks = error_ticks;
+    if (is_first) first_error_ticks = error_ticks;
     fired++;
     step_slot();
+    if (cycles_wait && find_slot() && cycle != last.cycle) cycle_digest_end(true);  // nobody knows when the next begins
     const int64_t slip_ticks = error_ticks - first_error_ticks;
     return slip_ticks <= TOLERANCE_TICKS && slip_ticks >= -TOLERANCE_TICKS;
 }

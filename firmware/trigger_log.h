@@ -12,15 +12,17 @@
 extern "C" {
 #endif
 
-// Empties the log for a new start of `sequence`, which must stay as it is while triggers are added.
-void trigger_log_begin(const struct sequence* sequence);
+// Empties the log for a new start of `sequence`, which must stay as it is while triggers are added. `cycles_wait`: each
+// cycle begins whenever an edge comes, so only the triggers within a cycle have a schedule.
+void trigger_log_begin(const struct sequence* sequence, bool cycles_wait);
 
 // From the moment on that `after_cycles` of the sequence so far are over, the next one plays. Call it before the first
 // trigger of that cycle is added.
 void trigger_log_swap(const struct sequence* next, uint32_t after_cycles);
 
 // Adds the next trigger. `stamp` is the witness's; `now_ticks` (since start, good to half a minute) tells how often the
-// stamp has wrapped. False when the trigger is not at its scheduled distance from the first one.
+// stamp has wrapped. False when the trigger is not at its scheduled distance from the first one, or from the first of
+// its cycle where cycles wait.
 bool trigger_log_add(uint32_t stamp, uint64_t now_ticks);
 
 // Notes that `count` triggers fired whose stamps were overwritten before they were read.

@@ -20,11 +20,10 @@ void witness_init(void) {
     PIO_SM_CLKDIV(PIO1_BASE, machine.machine) = PIO_CLKDIV(1);
     PIO_SM_EXECCTRL(PIO1_BASE, machine.machine) =
         PIO_EXEC_WRAP(WITNESS_WRAP_TARGET, WITNESS_WRAP) | PIO_EXEC_JMP_PIN(BOARD_PIN_TRIG0);
-    PIO_SM_PINCTRL(PIO1_BASE, machine.machine) = PIO_PINS_IN(BOARD_PIN_GENLOCK);
     REGISTER(PIO_IRQ1_INTE(PIO1_BASE)) = PIO_INTE_FLAG(WITNESS_STAMPED);
 }
 
-void witness_arm(bool at_edge) {
+void witness_arm(enum ols_start_source start) {
     TIMER_ARMED = 1u << BOARD_ALARM_TRIGGER;  // of the run before
     PIO_IRQ(PIO1_BASE) = 1u << WITNESS_STAMPED;
     DMA_AL1_CTRL(CHANNEL) = 0;
@@ -32,8 +31,10 @@ void witness_arm(bool at_edge) {
     while (DMA_AL1_CTRL(CHANNEL) & DMA_CTRL_BUSY) {
     }
     pio_stop(machine, PIO_SHIFT_JOIN_RX);
+    PIO_SM_PINCTRL(PIO1_BASE, machine.machine) =
+        PIO_PINS_IN(start == OLS_START_EACH_CYCLE_BY_EDGE ? BOARD_PIN_PHOTO : BOARD_PIN_GENLOCK);
     pio_execute(machine, PIO_MOV_X_ONES);
-    pio_execute(machine, PIO_JMP | (at_edge ? WITNESS_GENLOCK : WITNESS_WRAP_TARGET));
+    pio_execute(machine, PIO_JMP | (start == OLS_START_BY_COMMAND ? WITNESS_WRAP_TARGET : WITNESS_GENLOCK));
     DMA_READ_ADDR(CHANNEL) = (uint32_t)&PIO_RXF(PIO1_BASE, machine.machine);
     DMA_WRITE_ADDR(CHANNEL) = (uint32_t)ring;
     DMA_TRANS_COUNT(CHANNEL) = COUNT_MAX;

@@ -3,15 +3,16 @@
 #ifndef OLS_WITNESS_H
 #define OLS_WITNESS_H
 
-#include <stdbool.h>
 #include <stdint.h>
+
+#include "wire.h"
 
 enum { WITNESS_RING_STAMPS = 1024 };
 enum { WITNESS_STAMPED = 0, WITNESS_LIGHT_TOO_LONG = 1 };  // flags of PIO block 1, as in pulse.pio
 
 void witness_init(void);
-// `at_edge`: counts from the first rise of GENLOCK after witness_start, not from that.
-void witness_arm(bool at_edge);
+// By an edge: counts from the first rise of GENLOCK, or of PHOTO (receptor.h), after witness_start, not from that.
+void witness_arm(enum ols_start_source start);
 
 // Before player_start: an edge between the two is then one that both know of.
 void witness_start(void);

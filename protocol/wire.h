@@ -69,6 +69,7 @@ enum ols_capability {
     OLS_CAN_START_BY_EDGE = 4,    // of GENLOCK
     OLS_CAN_GREY = 8,             // slots may have planes
     OLS_CAN_SWAP = 2,             // the next program can be loaded while one plays
+    OLS_CAN_CYCLE_BY_EDGE = 16,   // each cycle can wait for a debounced edge of GENLOCK, such as a photo-receptor's
     OLS_CAN_SPEAK_CAN = 32,       // a CAN controller was found at start
     OLS_CAN_DIGEST = 64           // keeps a digest of each cycle
 };
@@ -87,6 +88,7 @@ struct ols_hello_reply {
     uint16_t lamps_lit_max;           // chain bits that a pattern may light at once: the supply's current
     uint16_t lamp_duty_max_permille;  // of a cycle that any lamp may be lit
     uint32_t edge_start_ticks;        // from the rise of GENLOCK to the begin of the first cycle
+    uint32_t cycle_edge_ticks;        // and debounce_ticks: from a rise of GENLOCK to the begin of the cycle it starts
     char board[16];                   // whose pins this firmware drives, zero-terminated: "pico", "feather_can"
 } OLS_PACKED;
 
@@ -134,16 +136,20 @@ struct ols_slot {
 } OLS_PACKED_WORDS;
 
 #define OLS_HEARTBEAT_TICKS_MIN 625000  // 5 ms: the board looks every millisecond or two
+#define OLS_DEBOUNCE_TICKS_MIN 4
 
 enum ols_start_source {
     OLS_START_BY_COMMAND = 0,
-    OLS_START_BY_EDGE = 1  // the first rise of GENLOCK after OLS_START
+    OLS_START_BY_EDGE = 1,            // the first rise of GENLOCK after OLS_START
+    OLS_START_EACH_CYCLE_BY_EDGE = 2  // each cycle by a debounced rise of GENLOCK, from a photo-receptor for example
 };
 
 struct ols_arm {
     uint32_t heartbeat_ticks;  // without a message for longer than this, armed or playing, is a fault; 0: never
     uint8_t start_source;      // enum ols_start_source
     uint8_t reserved[3];       // 0
+    uint32_t
+        debounce_ticks;  // for which GENLOCK must stay high or low to be so, even; 0 unless each cycle is started by it
 } OLS_PACKED;
 
 enum ols_state {
@@ -200,6 +206,8 @@ struct ols_status_reply {
     uint32_t program_crc32;  // of the loaded program, 0 without
     uint8_t next;            // enum ols_next
     uint8_t reserved[3];
+    uint32_t edges_seen;    // of GENLOCK, debounced, since start, where each starts a cycle
+    uint32_t edges_missed;  // of those, the ones that came while a cycle was playing
 } OLS_PACKED;
 
 struct ols_read_trigger_log {
@@ -341,14 +349,14 @@ struct ols_error_reply {
 
 OLS_WIRE_ASSERT(sizeof(struct ols_frame_header) == 10, "frame header");
 OLS_WIRE_ASSERT(sizeof(struct ols_hello) == 8, "hello");
-OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 88, "hello reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_hello_reply) == 92, "hello reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger) == 12, "trigger");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_begin) == 68, "load begin");
 OLS_WIRE_ASSERT(sizeof(struct ols_load_chunk) == 4, "load chunk");
 OLS_WIRE_ASSERT(sizeof(struct ols_slot) == 16, "slot");
-OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 8, "arm");
+OLS_WIRE_ASSERT(sizeof(struct ols_arm) == 12, "arm");
 OLS_WIRE_ASSERT(sizeof(struct ols_swap_reply) == 8, "swap reply");
-OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 44, "status reply");
+OLS_WIRE_ASSERT(sizeof(struct ols_status_reply) == 52, "status reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_read_trigger_log) == 8, "read trigger log");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_reply) == 16, "trigger log reply");
 OLS_WIRE_ASSERT(sizeof(struct ols_trigger_log_entry) == 20, "trigger log entry");

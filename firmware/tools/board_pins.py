@@ -11,8 +11,10 @@ import json
 import sys
 import tomllib
 
-TIMELINE = ['LATCH', 'LIGHT_EN', 'TRIG0', 'TRIG1', 'TRIG2', 'TRIG3', 'SYNC']  # bits 0 to 6 of an event's pins
-OUTPUTS = ['DATA', 'CLK'] + TIMELINE
+TIMELINE = ['LATCH', 'LIGHT_EN', 'TRIG0', 'TRIG1', 'TRIG2', 'TRIG3', 'SYNC', 'READY']  # bits 0 to 7 of an event's pins
+PLAYER = ['DATA', 'CLK'] + TIMELINE  # of PIO block 0
+OUTPUTS = PLAYER + ['PHOTO']
+OPTIONAL = ['READY']  # a board may not have it
 STOP_INPUTS = ['ESTOP', 'OVER_TEMPERATURE', 'OPEN_LAMP']  # enum board_stop_input of board.h
 INPUTS = ['GENLOCK']
 CAN_PINS = ['CAN_MISO', 'CAN_SCK', 'CAN_MOSI', 'CAN_STANDBY', 'CAN_RESET', 'CAN_CS', 'CAN_INTERRUPT']
@@ -32,9 +34,13 @@ def consecutive(pins, names):
             raise BoardError(f'{", ".join(names)} must be on consecutive GPIOs in this order: PIO addresses them by number')
 
 
+def present(board, names):
+    return [name for name in names if name in board['outputs'] or name not in OPTIONAL]
+
+
 def check(board):
     """Raises BoardError when no firmware could work with these pins."""
-    groups = [('outputs', board['outputs'], OUTPUTS), ('stop_inputs', board['stop_inputs'], STOP_INPUTS),
+    groups = [('outputs', board['outputs'], present(board, OUTPUTS)), ('stop_inputs', board['stop_inputs'], STOP_INPUTS),
               ('inputs', board['inputs'], INPUTS)]
     if 'can' in board:
         groups.append(('can.pins', board['can']['pins'], CAN_PINS))
@@ -48,7 +54,7 @@ def check(board):
             if pin['gpio'] in owner:
                 raise BoardError(f'GPIO {pin["gpio"]} is both {owner[pin["gpio"]]} and {name}')
             owner[pin['gpio']] = name
-    consecutive(board['outputs'], TIMELINE)
+    consecutive(board['outputs'], present(board, TIMELINE))
     consecutive(board['stop_inputs'], STOP_INPUTS)
     if len(board['name'].encode()) >= NAME_BYTES:
         raise BoardError(f'the name "{board["name"]}" is longer than the {NAME_BYTES - 1} bytes of a hello')
@@ -75,7 +81,7 @@ def enum(pairs):
 def header(board):
     """What board.h includes: names as C knows them."""
     outputs, can = board['outputs'], board.get('can')
-    pairs = [(f'BOARD_PIN_{name}', outputs[name]['gpio']) for name in OUTPUTS]
+    pairs = [(f'BOARD_PIN_{name}', outputs[name]['gpio']) for name in present(board, OUTPUTS)]
     pairs += [('BOARD_PIN_TIMELINE', outputs['LATCH']['gpio']),
               ('BOARD_PIN_STOP_INPUTS', board['stop_inputs']['ESTOP']['gpio']),
               ('BOARD_PIN_GENLOCK', board['inputs']['GENLOCK']['gpio']),
@@ -85,11 +91,11 @@ def header(board):
     if can:
         pairs += [(f'BOARD_PIN_{name}', can['pins'][name]['gpio']) for name in CAN_PINS]
         pairs += [('BOARD_CAN_SPI', can['spi']), ('BOARD_CAN_OSCILLATOR_HZ', can['oscillator_hz'])]
-    gpios = ', '.join(str(outputs[name]['gpio']) for name in OUTPUTS)
+    gpios = ', '.join(str(outputs[name]['gpio']) for name in present(board, PLAYER))
     lines = ['// SPDX-License-Identifier: MIT', f'// Made by board_pins.py from boards/{board["name"]}.toml.',
              '#ifndef OLS_BOARD_PINS_H', '#define OLS_BOARD_PINS_H', '', f'#define BOARD_NAME "{board["name"]}"',
              f'#define BOARD_HAS_CAN {int(bool(can))}',
-             f'#define BOARD_OUTPUT_PINS {{{gpios}}}', '']
+             f'#define BOARD_OUTPUT_PINS {{{gpios}}}  // of PIO block 0', '']
     return '\n'.join(lines + enum(pairs) + ['', '#endif']) + '\n'
 
 
@@ -98,7 +104,7 @@ def boards_json(boards):
     def gpios(pins):
         return {name: pin['gpio'] for name, pin in pins.items()}
     tables = {board['name']: {'title': board['title'], 'chainBits': board['shift']['chain_bits'],
-                              'outputs': gpios({name: board['outputs'][name] for name in OUTPUTS}),
+                              'outputs': gpios({name: board['outputs'][name] for name in present(board, OUTPUTS)}),
                               'stopInputs': gpios(board['stop_inputs']), 'inputs': gpios(board['inputs']),
                               'can': {'spi': board['can']['spi'], 'pins': gpios(board['can']['pins'])} if 'can' in board else None}
               for board in boards}
@@ -108,7 +114,7 @@ def boards_json(boards):
 def rows(board):
     """(signal, pin, direction, pull, use): internal pulls as board_init sets them."""
     active_low = board['light']['enable_active_low']
-    for name in OUTPUTS:
+    for name in present(board, OUTPUTS):
         up = name == 'LIGHT_EN' and active_low
         yield name, board['outputs'][name], 'out', 'up' if up else 'down'
     for name, pin in list(board['stop_inputs'].items()) + list(board['inputs'].items()):

@@ -3,7 +3,7 @@
 """Assembles the PIO programs of one .pio file into a C header: what firmware/pulse.pio uses of the language of RP2040
 datasheet 3.3, and nothing else. Addresses count from a program's start; the firmware relocates jumps when it loads one.
 
-usage: pioasm.py pulse.pio > pulse.h
+usage: pioasm.py [NAME=VALUE ...] pulse.pio > pulse.h        NAME=VALUE replaces the value that a .define gives
 """
 import re
 import sys
@@ -46,7 +46,7 @@ class Program:
         self.lines = []  # (line number, instruction text)
         self.labels = {}
         self.public_labels = []
-        self.defines = []
+        self.defines = {}
         self.wrap_target = 0
         self.wrap = None
 
@@ -65,10 +65,10 @@ class Program:
 
     def encode(self, text):
         """`operation operands [side N] [[delay]]` as a 16-bit word (datasheet 3.4)."""
-        match = re.fullmatch(r'(\w+)\s*(.*?)(?:\s+side\s+(\w+))?(?:\s*\[(\w+)\])?', text.replace('nop', 'mov y, y'))
+        match = re.fullmatch(r'(\w+)\s*(.*?)(?:\s+side\s+(\w+))?(?:\s*\[(.+)\])?', text.replace('nop', 'mov y, y'))
         operation, operands, side, delay = match.groups()
         delay_bits = 5 - self.side_set_bits
-        delay = number(delay, 0, (1 << delay_bits) - 1, 'delay') if delay else 0
+        delay = self.delay(delay, (1 << delay_bits) - 1) if delay else 0
         if bool(self.side_set_bits) != (side is not None):
             raise AssemblyError('each instruction needs "side" exactly when the program has .side_set')
         side = number(side, 0, (1 << self.side_set_bits) - 1, 'side') if side else 0
@@ -76,6 +76,12 @@ class Program:
         if encoder is None:
             raise AssemblyError(f'unknown instruction "{operation}"')
         return encoder(operands.lower()) | (side << delay_bits | delay) << 8
+
+    def delay(self, text, high):
+        """A number, or a name of a .define less a number."""
+        name, _, less = (part.strip() for part in text.partition('-'))
+        value = self.defines.get(name, name)
+        return number(str(int(value) - int(less)) if less else str(value), 0, high, 'delay')
 
     def encode_jmp(self, operands):
         condition, _, target = operands.replace(',', ' ').rpartition(' ')
@@ -118,9 +124,9 @@ class Program:
         return 7 << 13 | lookup(SET_DESTINATIONS, destination, 'destination') << 5 | number(value, 0, 31, 'value')
 
 
-def parse(source):
-    """The programs of a .pio text, in order."""
-    programs = []
+def parse(source, replaced):
+    """The programs of a .pio text, in order. `replaced` holds values of defines, by name, instead of the text's."""
+    programs, replaced = [], dict(replaced)
     for line_number, line in enumerate(source.splitlines(), 1):
         text = re.sub(r'(;|//).*', '', line).strip()
         if not text:
@@ -134,7 +140,7 @@ def parse(source):
         if match := re.fullmatch(r'\.side_set\s+([1-5])', text):
             program.side_set_bits = int(match[1])
         elif match := re.fullmatch(r'\.define\s+public\s+(\w+)\s+(\w+)', text):
-            program.defines.append((match[1], int(match[2], 0)))
+            program.defines[match[1]] = replaced.pop(match[1], int(match[2], 0))
         elif text == '.wrap_target':
             program.wrap_target = len(program.lines)
         elif text == '.wrap':
@@ -147,6 +153,8 @@ def parse(source):
             raise AssemblyError(f'line {line_number}: unknown directive "{text}"')
         else:
             program.lines.append((line_number, text))
+    if replaced:
+        raise AssemblyError(f'nothing defines {", ".join(replaced)}')
     return programs
 
 
@@ -159,20 +167,21 @@ def header(programs):
         lines += ['', f'enum {{', f'    {upper}_WORDS = {len(words)},',
                   f'    {upper}_WRAP_TARGET = {program.wrap_target},', f'    {upper}_WRAP = {program.wrap},']
         lines += [f'    {upper}_{label.upper()} = {program.labels[label.lower()]},' for label in program.public_labels]
-        lines += [f'    {name} = {value},' for name, value in program.defines]
+        lines += [f'    {name} = {value},' for name, value in program.defines.items()]
         lines += ['};', f'#define {upper}_PROGRAM \\', '    { ' + ', '.join(f'0x{word:04x}' for word in words) + ' }']
     return '\n'.join(lines + ['', '#endif'])
 
 
 def main(arguments):
-    if len(arguments) != 1:
+    if not arguments or not all(re.fullmatch(r'\w+=\d+', argument) for argument in arguments[:-1]):
         raise SystemExit(__doc__)
-    with open(arguments[0], encoding='utf-8') as file:
+    with open(arguments[-1], encoding='utf-8') as file:
         source = file.read()
+    replaced = {name: int(value) for name, value in (argument.split('=') for argument in arguments[:-1])}
     try:
-        print(header(parse(source)))
+        print(header(parse(source, replaced)))
     except AssemblyError as error:
-        raise SystemExit(f'{arguments[0]}: {error}') from None
+        raise SystemExit(f'{arguments[-1]}: {error}') from None
 
 
 if __name__ == '__main__':

@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""How fast patterns go out to drivers of 10, 20 and 30 MHz, reckoned from the ticks that pulse.pio's loop takes: the table
-of docs/hardware.md.
+"""How fast patterns go out to drivers of 10, 20 and 30 MHz, reckoned from the ticks that pulse.pio's loop takes, as the
+Makefile's DRIVER_MHZ has it: the table of docs/hardware.md.
 
 usage: shift_rates.py [CHAIN_BITS]        prints the table
        shift_rates.py --write FILE        brings the table in FILE up to date
 """
+import re
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 import pioasm  # noqa: E402
 
-PULSE_PIO = Path(__file__).resolve().parents[1] / 'pulse.pio'
+FIRMWARE = Path(__file__).resolve().parents[1]
 TICK_NS = 8
 DRIVERS_MHZ = (10, 20, 30)
 # slot_times.h and events.h: latch, the shortest wait, the end of a cycle.
@@ -20,38 +21,38 @@ GAP_TICKS = 12 + 8 + 8
 BEGIN, END = '<!-- rates: made by firmware/tools/shift_rates.py -->\n', '<!-- end of rates -->\n'
 
 
-def costs():
-    """What pulse.pio says that its steps take, by name, in ticks."""
-    return {name: value for program in pioasm.parse(PULSE_PIO.read_text(encoding='utf-8')) for name, value in program.defines}
+def costs(driver_mhz):
+    """What pulse.pio says that its steps take, by name, in ticks, in a build for these drivers."""
+    makefile = (FIRMWARE / 'Makefile').read_text(encoding='utf-8')
+    replaced = re.search(rf'^PULSE_DEFINES_{driver_mhz} := (.*)$', makefile, re.M)[1]
+    replaced = {name: int(value) for name, value in (define.split('=') for define in replaced.split())}
+    programs = pioasm.parse((FIRMWARE / 'pulse.pio').read_text(encoding='utf-8'), replaced)
+    return {name: value for program in programs for name, value in program.defines.items()}
 
 
-def shift_ticks(chain_bits, divider):
+def shift_ticks(chain_bits, divider, driver_mhz=20):
     """As slot_shift_ticks of slot_times.c: from a pattern's light to the next one being in the chain."""
-    cost = costs()
+    cost = costs(driver_mhz)
     words = -(-chain_bits // 32)
-    shifter = (cost['SHIFTER_START_TICKS'] + cost['SHIFTER_BIT_TICKS'] * chain_bits +
+    shifter = (cost['SHIFTER_START_TICKS'] + (cost['SHIFTER_LOW_TICKS'] + cost['SHIFTER_HIGH_TICKS']) * chain_bits +
                cost['SHIFTER_WORD_TICKS'] * words + 1)
     return cost['TIMELINE_SHIFT_DELAY_TICKS'] + divider * shifter
 
 
 def rates(chain_bits):
-    """(driver's MHz, divider, our MHz, DATA set-up ns, CLK high ns, us a pattern, slots a second) for each driver."""
-    bit_ticks = costs()['SHIFTER_BIT_TICKS']
+    """(driver's MHz, our MHz, DATA set-up ns, CLK high ns, us a pattern, ticks of the shortest slot) for each driver."""
     for driver_mhz in DRIVERS_MHZ:
-        # MHz of a bit are 1000 / (ticks x 8 ns x divider).
-        divider = next(d for d in range(1, 100) if 1000 / (bit_ticks * TICK_NS * d) <= driver_mhz)
-        ticks = shift_ticks(chain_bits, divider)
-        low_ticks = 4  # of a bit: `out` with its delay; then CLK is high
-        yield (driver_mhz, divider, 1000 / (bit_ticks * TICK_NS * divider), low_ticks * TICK_NS * divider,
-               (bit_ticks - low_ticks) * TICK_NS * divider, ticks * TICK_NS / 1000,
-               int(1e9 / TICK_NS / (ticks + GAP_TICKS)))
+        low_ticks, high_ticks = (costs(driver_mhz)[f'SHIFTER_{level}_TICKS'] for level in ('LOW', 'HIGH'))
+        ticks = shift_ticks(chain_bits, 1, driver_mhz)
+        yield (driver_mhz, 1000 / ((low_ticks + high_ticks) * TICK_NS), low_ticks * TICK_NS, high_ticks * TICK_NS,
+               ticks * TICK_NS / 1000, ticks + GAP_TICKS)
 
 
 def table(chain_bits):
-    lines = ['| drivers of | `divider` | CLK | DATA set up | CLK high | a pattern takes | on/off slots a second |',
+    lines = ['| `DRIVER_MHZ` | CLK | DATA set up | CLK high | a pattern takes | shortest slot | on/off slots a second |',
              '| --- | --- | --- | --- | --- | --- | --- |']
-    lines += [f'| {driver} MHz | {divider} | {mhz:.1f} MHz | {setup} ns | {high} ns | {us:.2f} us | {slots} |'
-              for driver, divider, mhz, setup, high, us, slots in rates(chain_bits)]
+    lines += [f'| {driver} | {mhz:.1f} MHz | {setup} ns | {high} ns | {us:.2f} us | {slot_ticks} ticks | '
+              f'{int(1e9 / TICK_NS / slot_ticks)} |' for driver, mhz, setup, high, us, slot_ticks in rates(chain_bits)]
     return '\n'.join(lines) + '\n'
 
 

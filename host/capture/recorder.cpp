@@ -209,6 +209,8 @@ class Recording {
     bool log_ended_ = false, camera_closed_ = false, finished_ = false;
 };
 
+}  // namespace
+
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
     if (board.info().tick_hz != tick_hz)
         return fail(
@@ -222,14 +224,12 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
                     "; when the cause is gone, run `stagectl status --clear-fault`");
     const auto program = encode_program(sequence, stage);
     if (Status s = board.load(program, uint16_t(sequence.slots.size()), uint16_t(stage.chain_bits),
-                              uint32_t(sequence.config.cycles));
+                              uint32_t(sequence.config.cycles), sequence.config.playback);
         !s.ok())
         return s;
-    if (Status s = board.arm(); !s.ok()) return s;
+    if (Status s = board.arm(sequence.config.playback); !s.ok()) return s;
     return board.start();
 }
-
-}  // namespace
 
 size_t frames_in_flight(const Sequence& sequence) {
     return 3 * sequence.slots.size() + 4 * options_for(sequence).reorder_frames;

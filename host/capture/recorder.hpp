@@ -38,6 +38,10 @@ struct RecordReport {
 // two reorder windows.
 size_t frames_in_flight(const Sequence& sequence);
 
+// Loads, arms and starts the sequence as its playback says; after that the board plays, or waits for an edge. The error is the
+// board's own, or says what a latched fault was.
+Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage);
+
 // Loads the sequence, arms and starts the board and returns when every trigger is decided. `stop` ends it early: the
 // board goes dark, what was fired is still identified, the rest is missing.
 // Errors: the board cannot be loaded or started. A board or camera that fails later is no error here: what was proved

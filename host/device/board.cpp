@@ -14,6 +14,9 @@ namespace ols {
 namespace {
 
 constexpr uint32_t reply_timeout_us = 1'000'000;
+// Of 22 bytes each: two packets. The board takes in one and keeps another while it waits for somebody to read its first
+// reply; a third would not be taken, and the write not end.
+constexpr uint32_t log_messages_at_once = 4;
 constexpr size_t packet_bytes = 64;  // full-speed bulk: a read must hold whole packets
 constexpr size_t read_bytes = (OLS_FRAME_BYTES_MAX + packet_bytes - 1) / packet_bytes * packet_bytes;
 
@@ -130,14 +133,17 @@ std::string Board::id() const {
     return hex;
 }
 
-Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {
+uint16_t Board::add_request(uint16_t type, std::span<const uint8_t> payload, std::vector<uint8_t>& bytes) {
     uint8_t frame[OLS_FRAME_BYTES_MAX];
     const uint16_t request_id = ++last_request_id_;
     const size_t frame_bytes = ols_frame_encode(type, request_id, payload.data(), payload.size(), frame, sizeof frame);
     assert(frame_bytes > 0);
-    if (const Status sent = transfer_->write({frame, frame_bytes}, reply_timeout_us); !sent.ok()) return sent.error();
-    std::vector<uint8_t> received;
-    for (size_t taken = 0;;) {
+    bytes.insert(bytes.end(), frame, frame + frame_bytes);
+    return request_id;
+}
+
+Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id) {
+    for (;;) {
         ols_frame reply;
         while (ols_frame_parser_read(parser_.get(), &reply)) {
             // A reply to a request that was given up earlier is nobody's any more.
@@ -146,14 +152,21 @@ Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8
             if (reply.type == (OLS_ERROR | OLS_REPLY)) return refusal(content);
             if (reply.type == (type | OLS_REPLY)) return std::vector<uint8_t>(content.begin(), content.end());
         }
-        if (taken == received.size()) {
+        if (received_.empty()) {
             auto bytes = transfer_->read(read_bytes, reply_timeout_us);
             if (!bytes.ok()) return bytes.error();
-            received = std::move(*bytes);
-            taken = 0;
+            received_ = std::move(*bytes);
         }
-        taken += ols_frame_parser_write(parser_.get(), received.data() + taken, received.size() - taken);
+        const size_t taken = ols_frame_parser_write(parser_.get(), received_.data(), received_.size());
+        received_.erase(received_.begin(), received_.begin() + ptrdiff_t(taken));
     }
+}
+
+Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {
+    std::vector<uint8_t> bytes;
+    const uint16_t request_id = add_request(type, payload, bytes);
+    if (const Status sent = transfer_->write(bytes, reply_timeout_us); !sent.ok()) return sent.error();
+    return wait_for_reply(type, request_id);
 }
 
 Status Board::command(uint16_t type) {
@@ -172,8 +185,10 @@ Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
     return reply;
 }
 
-Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles) {
+Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles,
+                   const Playback& playback) {
     ols_load_begin begin{};
+    describe_triggers(playback, begin);
     begin.slot_count = slot_count;
     begin.chain_bits = chain_bits;
     begin.cycles = cycles;
@@ -192,8 +207,8 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
     return command(OLS_LOAD_END);
 }
 
-Status Board::arm() {
-    const ols_arm arm{};  // no heartbeat: a capture host may be busy for longer than it is good to play on
+Status Board::arm(const Playback& playback) {
+    const ols_arm arm = arm_message(playback);
     const auto reply = request(OLS_ARM, bytes_of(arm));
     if (!reply.ok()) return reply.error();
     return Done{};
@@ -215,23 +230,46 @@ Status Board::reboot_to_bootloader() {
     return command(OLS_REBOOT_TO_BOOTLOADER);
 }
 
+Result<ols_swap_reply> Board::swap() {
+    return ask<ols_swap_reply>(OLS_SWAP);
+}
+
 Result<ols_status_reply> Board::status() {
     return ask<ols_status_reply>(OLS_STATUS);
 }
 
-Result<TriggerLog> Board::read_trigger_log(uint32_t first_counter) {
-    const ols_read_trigger_log what{first_counter, OLS_LOG_ENTRIES_MAX, 0};
-    const auto bytes = request(OLS_READ_TRIGGER_LOG, bytes_of(what));
-    if (!bytes.ok()) return bytes.error();
+// Appends the entries of a reply. False when its length is wrong.
+static bool append_entries(std::span<const uint8_t> reply, TriggerLog& log) {
     ols_trigger_log_reply head;
-    if (bytes->size() < sizeof head) return wrong_reply();
-    std::memcpy(&head, bytes->data(), sizeof head);
-    if (bytes->size() != sizeof head + head.entry_count * sizeof(ols_trigger_log_entry)) return wrong_reply();
-    TriggerLog log{{}, head.next_counter, head.entries_lost};
-    log.entries.resize(head.entry_count);
+    if (reply.size() < sizeof head) return false;
+    std::memcpy(&head, reply.data(), sizeof head);
+    if (reply.size() != sizeof head + head.entry_count * sizeof(ols_trigger_log_entry)) return false;
+    log.next_counter = head.next_counter;
+    log.entries_lost = head.entries_lost;
+    const size_t before = log.entries.size();
+    log.entries.resize(before + head.entry_count);
     if (head.entry_count)
-        std::memcpy(log.entries.data(), bytes->data() + sizeof head,
-                    log.entries.size() * sizeof(ols_trigger_log_entry));
+        std::memcpy(log.entries.data() + before, reply.data() + sizeof head,
+                    head.entry_count * sizeof(ols_trigger_log_entry));
+    return true;
+}
+
+Result<TriggerLog> Board::read_trigger_log(uint32_t first_counter, uint32_t known_counter) {
+    const uint32_t waiting = known_counter > first_counter ? known_counter - first_counter : 0;
+    const uint32_t messages = std::clamp(waiting / OLS_LOG_ENTRIES_MAX, 1u, log_messages_at_once);
+    std::vector<uint8_t> bytes;
+    std::vector<uint16_t> ids;
+    for (uint32_t n = 0; n < messages; ++n) {
+        const ols_read_trigger_log what{first_counter + n * OLS_LOG_ENTRIES_MAX, OLS_LOG_ENTRIES_MAX, 0};
+        ids.push_back(add_request(OLS_READ_TRIGGER_LOG, bytes_of(what), bytes));
+    }
+    if (const Status sent = transfer_->write(bytes, reply_timeout_us); !sent.ok()) return sent.error();
+    TriggerLog log;
+    for (const uint16_t id : ids) {
+        const auto reply = wait_for_reply(OLS_READ_TRIGGER_LOG, id);
+        if (!reply.ok()) return reply.error();
+        if (!append_entries(*reply, log)) return wrong_reply();
+    }
     return log;
 }
 

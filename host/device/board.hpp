@@ -10,6 +10,7 @@
 
 #include "device/transfer.hpp"
 #include "frame.h"
+#include "stage/playback.hpp"
 #include "wire.h"
 
 namespace ols {
@@ -50,17 +51,23 @@ class Board {
     const ols_hello_reply& info() const { return info_; }
     std::string id() const;  // the flash chip's unique number, in hex
 
-    // Sends a program (encode_program) of `slot_count` slots in chunks; `cycles` 0 plays until stopped.
-    Status load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles);
-    Status arm();
+    // Sends a program (encode_program) of `slot_count` slots in chunks; `cycles` 0 plays until stopped. While the board plays
+    // it is the one that swap lets follow.
+    Status load(std::span<const uint8_t> program, uint16_t slot_count, uint16_t chain_bits, uint32_t cycles,
+                const Playback& playback = {});
+    Status arm(const Playback& playback = {});
+    // Lets the program loaded last follow at the end of a cycle, which the reply names.
+    Result<ols_swap_reply> swap();
     Status start();
     Status stop();
     Status clear_fault();
     Result<ols_status_reply> status();
     Status reboot_to_bootloader();  // the board leaves; refused while a program is armed or plays
 
-    // The log from `first_counter` on, as much of it as one message holds.
-    Result<TriggerLog> read_trigger_log(uint32_t first_counter);
+    // The log from `first_counter` on. Asks for one message of it, or, when triggers up to `known_counter` are known to have
+    // fired, for up to four at once: at 20 000 triggers a second a message fills in 2.4 ms, which a host that waits for each
+    // reply may not keep up with.
+    Result<TriggerLog> read_trigger_log(uint32_t first_counter, uint32_t known_counter = 0);
 
     // The digests from number `first_digest` on, as many as one message holds.
     Result<CycleDigests> read_digests(uint32_t first_digest);
@@ -70,12 +77,16 @@ class Board {
 
     // Sends a request and waits for its reply, whose payload it returns.
     Result<std::vector<uint8_t>> request(uint16_t type, std::span<const uint8_t> payload);
+    // The two halves of that: appends the request to `bytes`, and returns its id; waits for the reply to that id.
+    uint16_t add_request(uint16_t type, std::span<const uint8_t> payload, std::vector<uint8_t>& bytes);
+    Result<std::vector<uint8_t>> wait_for_reply(uint16_t type, uint16_t request_id);
     Status command(uint16_t type);
     template <typename Reply>
     Result<Reply> ask(uint16_t type, std::span<const uint8_t> payload = {});
 
     std::unique_ptr<Transfer> transfer_;
     std::unique_ptr<ols_frame_parser> parser_;
+    std::vector<uint8_t> received_;  // bytes that the parser has not taken yet
     uint16_t last_request_id_ = 0;
     ols_hello_reply info_{};
 };

@@ -18,7 +18,8 @@ double us_of_ticks(uint64_t ticks) {
 LampLight measure_lamp(const Sequence& sequence, size_t lamp) {
     LampLight light;
     int flashes = 0;
-    uint64_t lit_ticks = 0, start = 0, first_on = 0, last_off = 0, longest = 0;
+    uint64_t start = 0, first_on = 0, last_off = 0, longest = 0;
+    double lit_ticks = 0;
     for (const Slot& slot : sequence.slots) {
         if (slot.lit[lamp]) {
             if (flashes++ == 0)
@@ -26,7 +27,7 @@ LampLight measure_lamp(const Sequence& sequence, size_t lamp) {
             else
                 longest = std::max(longest, start - last_off);
             last_off = start + slot.exposure_ticks;
-            lit_ticks += slot.exposure_ticks;
+            lit_ticks += slot.light_ticks(lamp);
         }
         start += slot.period_ticks;
     }
@@ -34,7 +35,7 @@ LampLight measure_lamp(const Sequence& sequence, size_t lamp) {
     longest = flashes ? std::max(longest, cycle - last_off + first_on) : cycle;  // across the cycle's end
     light.longest_dark_us = us_of_ticks(longest);
     light.strobe_hz = flashes * double(tick_hz) / double(cycle);
-    light.duty = double(lit_ticks) / double(cycle);
+    light.duty = lit_ticks / double(cycle);
     return light;
 }
 
@@ -66,9 +67,10 @@ Flicker measure_flicker(const Sequence& sequence) {
     std::vector<double> whole;
     uint64_t lit_ticks = 0;
     for (const Slot& slot : sequence.slots) {
-        const auto lit = std::count(slot.lit.begin(), slot.lit.end(), 1);
-        whole.push_back(double(lit) * slot.exposure_ticks);
-        if (lit) lit_ticks += slot.exposure_ticks;
+        double light = 0;
+        for (size_t lamp = 0; lamp < slot.lit.size(); ++lamp) light += slot.light_ticks(lamp);
+        whole.push_back(light);
+        if (light > 0) lit_ticks += slot.exposure_ticks;
     }
     flicker.whole = find_flicker(sequence, whole);
     flicker.light_duty = double(lit_ticks) / double(sequence.cycle_ticks());
@@ -76,7 +78,7 @@ Flicker measure_flicker(const Sequence& sequence) {
     for (size_t lamp = 0; lamp < lamps; ++lamp) {
         flicker.lamps.push_back(measure_lamp(sequence, lamp));
         std::vector<double> light;
-        for (const Slot& slot : sequence.slots) light.push_back(slot.lit[lamp] ? slot.exposure_ticks : 0);
+        for (const Slot& slot : sequence.slots) light.push_back(slot.light_ticks(lamp));
         const FlickerPeak peak = find_flicker(sequence, light);
         if (peak.modulation > flicker.worst_lamp.modulation) {
             flicker.worst_lamp = peak;

@@ -10,20 +10,25 @@
 #include <numbers>
 #include <numeric>
 
+#include "stage/pattern_slots.hpp"
 #include "stage/toml_section.hpp"
 
 namespace ols {
 
 namespace {
 
+constexpr const char* harmonics_name = "spherical_harmonics";
 constexpr int landmarks_a_group = 2;  // tracking and matte
-
-uint32_t ticks_of_us(double us) {
-    return uint32_t(std::lround(us * double(ticks_per_us)));
-}
 
 uint32_t period_ticks_of(const SequenceConfig& config) {
     return uint32_t(std::lround(double(tick_hz) / config.frame_rate_hz));
+}
+
+// The board logs TRIG0 only, so every slot fires it.
+uint8_t trigger_mask_of(const StageConfig& stage) {
+    uint8_t mask = 1;
+    for (const auto& camera : stage.cameras) mask |= uint8_t(1 << camera.trigger);
+    return mask;
 }
 
 // Which basis places of the cycle are dark, as flags; `places` a group.
@@ -50,7 +55,7 @@ class CycleLayout {
   public:
     CycleLayout(const SequenceConfig& config, const StageConfig& stage, const Basis& basis)
         : config_(config), basis_(basis), sphere_lamps_(stage.lamps.size()), lamps_(size_t(stage.lamp_count())) {
-        for (const auto& camera : stage.cameras) trigger_mask_ |= uint8_t(1 << camera.trigger);
+        trigger_mask_ = trigger_mask_of(stage);
     }
 
     std::vector<Slot> lay_out() const {
@@ -79,7 +84,7 @@ class CycleLayout {
         Slot slot;
         slot.kind = kind;
         slot.lit.assign(lamps_, 0);
-        slot.exposure_ticks = ticks_of_us(exposure_us);
+        slot.exposure_ticks = uint32_t(ticks_of_us(exposure_us));
         slot.period_ticks = period_ticks_of(config_);
         slot.trigger_mask = trigger_mask_;
         return slot;
@@ -105,7 +110,7 @@ class CycleLayout {
     const SequenceConfig& config_;
     const Basis& basis_;
     size_t sphere_lamps_, lamps_;
-    uint8_t trigger_mask_ = 1;  // the board logs TRIG0 only, so every slot fires it
+    uint8_t trigger_mask_;
 };
 
 Status check_exposures(const SequenceConfig& config) {
@@ -114,12 +119,48 @@ Status check_exposures(const SequenceConfig& config) {
                                                         {"tracking", config.tracking_exposure_us},
                                                         {"matte", config.matte_exposure_us}};
     for (const auto& [name, exposure_us] : exposures)
-        if (ticks_of_us(exposure_us) >= period_ticks)
+        if (ticks_of_us(exposure_us) >= int64_t(period_ticks))
             return fail(
                 fmt::format("the {} exposure of {} us does not fit the {:.1f} us between frames at {} frames "
                             "a second: shorten it or lower frame_rate_hz",
                             name, exposure_us, double(period_ticks) / double(ticks_per_us), config.frame_rate_hz));
     return Done{};
+}
+
+// What is played instead of a capture basis, and where its triggers lie.
+void read_patterns(TomlSection& file, SequenceConfig& config) {
+    TomlSection offset = file.section("offset_us");
+    for (const SlotKind kind : {SlotKind::basis, SlotKind::tracking, SlotKind::matte, SlotKind::dark}) {
+        double offset_us = 0;
+        offset.read(slot_kind_name(kind), offset_us, -1e6, 1e6);
+        config.kind_offset_ticks[size_t(kind)] = int32_t(ticks_of_us(offset_us));
+    }
+    if (file.has("harmonics") && config.basis != harmonics_name)
+        file.reject("harmonics", fmt::format("is for basis = \"{}\": remove it", harmonics_name));
+    TomlSection harmonics = file.section("harmonics");
+    harmonics.read("order", config.harmonics.order, 0, harmonics_order_max);
+    harmonics.read("planes", config.harmonics.planes, 2, OLS_PLANES_MAX);
+    harmonics.read_choice<HarmonicSign>("sign", config.harmonics.sign,
+                                        {{"split", HarmonicSign::split}, {"offset", HarmonicSign::offset}});
+    if (file.has("slot") && file.has("basis")) file.reject("slot", "and basis exclude each other: keep one of them");
+    config.listed_slots = read_listed_slots(file, 1e6 / config.frame_rate_hz);
+}
+
+// The cycle of a sequence that is no capture basis.
+Result<Sequence> compile_patterns(const SequenceConfig& config, const StageConfig& stage) {
+    Sequence sequence{config, {}, {}};
+    sequence.basis.lamps = int(stage.lamps.size());
+    sequence.basis.name = config.listed_slots.empty() ? harmonics_name : "listed";
+    if (config.listed_slots.empty()) {
+        sequence.slots = harmonic_slots(config, stage, trigger_mask_of(stage));
+    } else {
+        auto slots = fit_listed_slots(config.listed_slots, stage, trigger_mask_of(stage));
+        if (!slots.ok()) return slots.error();
+        sequence.slots = std::move(*slots);
+    }
+    if (sequence.slots.size() > OLS_SLOTS_MAX)
+        return fail(fmt::format("the cycle has {} slots and the board plays {}", sequence.slots.size(), OLS_SLOTS_MAX));
+    return sequence;
 }
 
 }  // namespace
@@ -140,6 +181,11 @@ uint64_t Sequence::cycle_ticks() const {
     return ticks;
 }
 
+uint32_t grey_exposure_ticks(double exposure_us, uint8_t planes) {
+    const int64_t units = planes ? (1 << planes) - 1 : 1;
+    return uint32_t(units * std::llround(exposure_us * double(ticks_per_us) / double(units)));
+}
+
 Result<SequenceConfig> read_sequence(const std::string& path) {
     auto file = TomlSection::open(path);
     if (!file.ok()) return file.error();
@@ -153,13 +199,18 @@ Result<SequenceConfig> read_sequence(const std::string& path) {
     exposure.read("tracking", config.tracking_exposure_us, 1, 1e6);
     exposure.read("matte", config.matte_exposure_us, 1, 1e6);
     file->read("tracking_lamps", config.tracking_lamps, 0, OLS_CHAIN_BITS_MAX - 1);
+    read_patterns(*file, config);
+    config.playback = read_playback(*file);
     if (const Status status = file->finish(); !status.ok()) return status.error();
-    if (const auto basis = find_basis(config.basis); !basis.ok()) return fail(path + ": " + basis.error().message);
+    if (!config.listed_slots.empty()) return config;
+    if (config.basis != harmonics_name)
+        if (const auto basis = find_basis(config.basis); !basis.ok())
+            return fail(path + ": " + basis.error().message + ", " + harmonics_name);
     if (const Status status = check_exposures(config); !status.ok()) return fail(path + ": " + status.error().message);
     return config;
 }
 
-Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage) {
+static Result<Sequence> compile_capture(const SequenceConfig& config, const StageConfig& stage) {
     auto basis = find_basis(config.basis);
     if (!basis.ok()) return basis.error();
     if (basis->lamps != int(stage.lamps.size()))
@@ -186,6 +237,14 @@ Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfi
     return sequence;
 }
 
+Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage) {
+    const bool is_capture = config.listed_slots.empty() && config.basis != harmonics_name;
+    auto sequence = is_capture ? compile_capture(config, stage) : compile_patterns(config, stage);
+    if (!sequence.ok()) return sequence;
+    for (Slot& slot : sequence->slots) slot.trigger_offset_ticks += config.kind_offset_ticks[size_t(slot.kind)];
+    return sequence;
+}
+
 bool has_unique_order(const std::vector<SlotKind>& cycle) {
     std::vector<SlotKind> turned = cycle;
     for (size_t turn = 1; turn < cycle.size(); ++turn) {
@@ -195,23 +254,34 @@ bool has_unique_order(const std::vector<SlotKind>& cycle) {
     return !cycle.empty();
 }
 
-std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage) {
+// The slot's patterns in chain order: one, or one for each plane, the most significant first.
+static void append_patterns(const Slot& slot, const StageConfig& stage, std::vector<uint32_t>& patterns) {
     const size_t words = (size_t(stage.chain_bits) + 31) / 32;
+    const int planes = slot.planes ? slot.planes : 1;
+    for (int plane = planes - 1; plane >= 0; --plane) {
+        std::vector<uint32_t> pattern(words, 0);
+        for (size_t lamp = 0; lamp < slot.lit.size(); ++lamp) {
+            const int bit = stage.chain_bit_of_lamp[lamp];
+            const uint8_t level = slot.planes ? slot.levels[lamp] : slot.lit[lamp];
+            if (level >> plane & 1) pattern[size_t(bit) / 32] |= 1u << (31 - bit % 32);
+        }
+        patterns.insert(patterns.end(), pattern.begin(), pattern.end());
+    }
+}
+
+std::vector<uint8_t> encode_program(const Sequence& sequence, const StageConfig& stage) {
     std::vector<ols_slot> heads;
     std::vector<uint32_t> patterns;
     for (const Slot& slot : sequence.slots) {
         ols_slot head{};
         head.kind = uint8_t(slot.kind);
         head.trigger_mask = slot.trigger_mask;
+        head.planes = slot.planes;
         head.exposure_ticks = slot.exposure_ticks;
         head.period_ticks = slot.period_ticks;
-        std::vector<uint32_t> pattern(words, 0);
-        for (size_t lamp = 0; lamp < slot.lit.size(); ++lamp) {
-            const int bit = stage.chain_bit_of_lamp[lamp];
-            if (slot.lit[lamp]) pattern[size_t(bit) / 32] |= 1u << (31 - bit % 32);
-        }
+        head.trigger_offset_ticks = slot.trigger_offset_ticks;
         heads.push_back(head);
-        patterns.insert(patterns.end(), pattern.begin(), pattern.end());
+        append_patterns(slot, stage, patterns);
     }
     const size_t head_bytes = heads.size() * sizeof(ols_slot), pattern_bytes = patterns.size() * sizeof(uint32_t);
     std::vector<uint8_t> bytes(head_bytes + pattern_bytes);

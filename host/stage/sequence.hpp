@@ -8,17 +8,47 @@
 
 #include "result.hpp"
 #include "stage/basis.hpp"
+#include "stage/harmonics.hpp"
+#include "stage/playback.hpp"
 #include "stage/stage.hpp"
 #include "wire.h"
 
 namespace ols {
 
-constexpr uint64_t tick_hz = 125'000'000;  // the board's clock
-constexpr uint64_t ticks_per_us = tick_hz / 1'000'000;
-
 enum class SlotKind : uint8_t { basis = OLS_BASIS, tracking = OLS_TRACKING, matte = OLS_MATTE, dark = OLS_DARK };
 
 const char* slot_kind_name(SlotKind kind);
+
+// The table [harmonics], for basis = "spherical_harmonics".
+struct HarmonicsConfig {
+    int order = 2;  // nine functions: enough for diffuse light (Ramamoorthi and Hanrahan 2001)
+    HarmonicSign sign = HarmonicSign::split;
+    int planes = 8;  // bits of a level
+};
+
+struct Slot {
+    SlotKind kind = SlotKind::dark;
+    int row = -1;                      // of the basis, for SlotKind::basis
+    std::vector<uint8_t> lit;          // a 0/1 for each lamp of the stage, sphere first
+    uint8_t planes = 0;                // bits of a level; 0: on or off
+    std::vector<uint8_t> levels;       // with planes, a level for each lamp
+    uint32_t exposure_ticks = 0;       // of light and trigger; in a grey slot, the light of the highest level
+    uint32_t period_ticks = 0;         // to the next slot's light
+    int32_t trigger_offset_ticks = 0;  // from the light to the triggers
+    uint8_t trigger_mask = 1;
+    bool fires_all = false;  // listed without its triggers: it gets those of the stage's cameras
+    std::string name;        // of a harmonic
+    double scale = 1;        // of a harmonic (HarmonicPattern)
+
+    // How long a lamp is lit.
+    double light_ticks(size_t lamp) const {
+        if (planes == 0) return lit[lamp] ? exposure_ticks : 0;
+        return double(levels[lamp]) * exposure_ticks / ((1 << planes) - 1);
+    }
+};
+
+// The ticks of an exposure; with planes, the nearest that divides into the units of the levels.
+uint32_t grey_exposure_ticks(double exposure_us, uint8_t planes);
 
 // What sequence.toml says.
 struct SequenceConfig {
@@ -31,16 +61,11 @@ struct SequenceConfig {
     double basis_exposure_us = 412;
     double tracking_exposure_us = 50;
     double matte_exposure_us = 412;
-    std::vector<int> tracking_lamps;  // empty: all on the sphere
-};
-
-struct Slot {
-    SlotKind kind = SlotKind::dark;
-    int row = -1;                 // of the basis, for SlotKind::basis
-    std::vector<uint8_t> lit;     // a 0/1 for each lamp of the stage, sphere first
-    uint32_t exposure_ticks = 0;  // of light and trigger
-    uint32_t period_ticks = 0;    // to the next slot's trigger rise
-    uint8_t trigger_mask = 1;
+    std::vector<int> tracking_lamps;    // empty: all on the sphere
+    int32_t kind_offset_ticks[4] = {};  // [offset_us]: from the light to the triggers, by kind
+    HarmonicsConfig harmonics;
+    std::vector<Slot> listed_slots;  // [[slot]], instead of a basis
+    Playback playback;
 };
 
 struct Sequence {
@@ -49,6 +74,8 @@ struct Sequence {
     std::vector<Slot> slots;  // one cycle
 
     uint64_t cycle_ticks() const;
+    // Whether its frames invert to single lamps; listed slots and harmonics do not.
+    bool is_capture() const { return basis.rows > 0; }
     uint64_t trigger_count() const { return uint64_t(config.cycles) * slots.size(); }
 };
 
@@ -64,6 +91,7 @@ Result<SequenceConfig> read_sequence(const std::string& path);
 // alone tells where in the cycle it is.
 // Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;
 // an order of kinds that some rotation repeats (see has_unique_order).
+// Listed slots and spherical harmonics are taken as they are, without optical code.
 Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage);
 
 // The optical code: whether no rotation of the cycle but the whole turn gives the same order of kinds, so that what a

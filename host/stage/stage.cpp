@@ -49,6 +49,10 @@ void read_lamps(TomlSection lamps, StageConfig& stage) {
     }
     lamps.read("radius_m", stage.radius_m, 0.05, 100);
     lamps.read("beam_exponent", stage.lamp_beam_exponent, 0, 1000);
+    lamps.read("on_delay_us", stage.lamp_response.on_delay_us, 0, 1000);
+    lamps.read("off_delay_us", stage.lamp_response.off_delay_us, 0, 1000);
+    lamps.read("rise_us", stage.lamp_response.rise_us, 0, 1000);
+    lamps.read("fall_us", stage.lamp_response.fall_us, 0, 1000);
     if (!lamps.has("matte")) return;
     stage.matte_lamps_m.clear();
     for (auto& place : lamps.sections("matte")) {

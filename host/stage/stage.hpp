@@ -8,6 +8,7 @@
 
 #include "image/frame.hpp"
 #include "result.hpp"
+#include "stage/lamp_response.hpp"
 #include "stage/lamps.hpp"
 
 namespace ols {
@@ -39,6 +40,7 @@ struct StageConfig {
     std::vector<LightPosition> lamps;  // sphere lamps, names lamp_000 ...
     double radius_m = 1.0;             // lamps' distance from the centre
     double lamp_beam_exponent = 1.2;   // beam falls off as cos^n off the lamp's axis, which points at the centre
+    LampResponse lamp_response;        // of every lamp with its driver
     std::vector<Vec3> matte_lamps_m;   // the matte board's lamps, absolute positions
     int chain_bits = 176;
     std::vector<int> chain_bit_of_lamp;  // sphere lamps first, then matte lamps

@@ -139,6 +139,17 @@ void TomlSection::read(const std::string& key, std::vector<int>& value, int min,
     value = std::move(numbers);
 }
 
+void TomlSection::read(const std::string& key, std::vector<std::string>& value) {
+    const toml::node* node = as_node(find(key));
+    if (!node) return;
+    std::vector<std::string> texts;
+    if (const auto* list = node->as_array())
+        for (const auto& entry : *list)
+            if (const auto text = entry.value_exact<std::string>()) texts.push_back(*text);
+    if (!node->is_array() || texts.size() != node->as_array()->size()) return reject(key, "must be a list of texts");
+    value = std::move(texts);
+}
+
 void TomlSection::read(const std::string& key, std::array<double, 3>& value) {
     const toml::node* node = as_node(find(key));
     if (!node) return;

@@ -26,6 +26,7 @@ class TomlSection {
     void read(const std::string& key, bool& value);
     void read(const std::string& key, std::string& value);
     void read(const std::string& key, std::vector<int>& value, int min, int max);
+    void read(const std::string& key, std::vector<std::string>& value);
     void read(const std::string& key, std::array<double, 3>& value);
 
     // A word that stands for a value, such as the name of a colour filter layout.

@@ -9,8 +9,10 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     int exit_code = 0;
     ols::add_run_verb(app, exit_code);
+    ols::add_play_verb(app, exit_code);
     ols::add_status_verb(app, exit_code);
     ols::add_sequence_verb(app, exit_code);
+    ols::add_grey_verb(app, exit_code);
     ols::add_calibrate_verb(app, exit_code);
     ols::add_ingest_verb(app, exit_code);
     ols::add_flash_verb(app, exit_code);

@@ -104,6 +104,11 @@ Result<int> run(const Options& options) {
     if (!stage.ok()) return stage.error();
     const auto sequence = compile_sequence(*config, *stage);
     if (!sequence.ok()) return sequence.error();
+    if (!sequence->is_capture() || sequence->config.playback.start == StartSource::photo)
+        return fail(
+            options.sequence +
+            ": a take is recorded from a capture basis, whose triggers come at an even pace; play listed slots, "
+            "harmonics and start = \"photo\" with `stagectl play`");
     const auto calibration = open_calibration(options, *stage);
     if (!calibration.ok()) return calibration.error();
     auto account = open_account(options.frames);

@@ -63,13 +63,18 @@ nlohmann::json to_json(const Summary& summary, const Sequence& sequence) {
                          {"lit", lit_lamps(slot)},
                          {"exposure_ticks", slot.exposure_ticks},
                          {"period_ticks", slot.period_ticks},
+                         {"trigger_offset_ticks", slot.trigger_offset_ticks},
+                         {"planes", slot.planes},
+                         {"levels", slot.levels},
+                         {"name", slot.name},
+                         {"scale", slot.scale},
                          {"trigger_mask", slot.trigger_mask}});
     const auto peak = [](const FlickerPeak& p) { return nlohmann::json{{"hz", p.hz}, {"modulation", p.modulation}}; };
     return {{"basis", sequence.basis.name},
             {"cycles", sequence.config.cycles},
             {"cycle_us", summary.cycle_us},
             {"seconds", summary.seconds},
-            {"optical_code_unique", true},  // or compiling had failed
+            {"optical_code_unique", sequence.is_capture()},  // or compiling had failed
             {"program_bytes", summary.program_bytes},
             {"light_duty", summary.flicker.light_duty},
             {"flicker_whole", peak(summary.flicker.whole)},
@@ -85,7 +90,9 @@ void print_slots(const Sequence& sequence) {
         const Slot& slot = sequence.slots[s];
         fmt::print("slot {:4}  {:8}  {:3} lamps  {:7.2f} us{}\n", s, slot_kind_name(slot.kind),
                    std::count(slot.lit.begin(), slot.lit.end(), 1), double(slot.exposure_ticks) / double(ticks_per_us),
-                   slot.row < 0 ? "" : fmt::format("  row {}", slot.row));
+                   !slot.name.empty() ? "  " + slot.name
+                   : slot.row < 0     ? ""
+                                      : fmt::format("  row {}", slot.row));
     }
 }
 
@@ -94,7 +101,8 @@ void print_summary(const Summary& summary, const Sequence& sequence) {
     fmt::print("{} slots a cycle: {} of basis {}, {} tracking, {} matte, {} dark\n", sequence.slots.size(),
                summary.kinds[size_t(SlotKind::basis)], sequence.basis.name, summary.kinds[size_t(SlotKind::tracking)],
                summary.kinds[size_t(SlotKind::matte)], summary.kinds[size_t(SlotKind::dark)]);
-    fmt::print("optical code: the order of tracking, matte and dark slots is unique over the cycle\n");
+    if (sequence.is_capture())
+        fmt::print("optical code: the order of tracking, matte and dark slots is unique over the cycle\n");
     fmt::print("cycle {:.3f} ms, {} cycles {:.3f} s; program of {} bytes\n", summary.cycle_us * 1e-3,
                sequence.config.cycles, summary.seconds, summary.program_bytes);
     fmt::print(

@@ -2,7 +2,8 @@
 # PIO against an emulator that is not ours: PyPI rp2040-pio-emulator, pin change by pin change, on random programs of
 # the instructions that both know. It has no flags, dividers, OUT PC, EXEC or STATUS, writes all pins in MOV PINS, and
 # refills an empty OSR in OUT alone, not in the background (RP2040 datasheet 3.5.4.2): with autopull, programs begin
-# with an OUT and have no PULL.
+# with an OUT and have no PULL. Then the board's own programs on it (oracle.py says how): a few slots of each kind, and the
+# debouncing of edges.
 import collections
 import json
 import random
@@ -10,9 +11,12 @@ import subprocess
 
 import pytest
 
+import check_trace
+from ols_board import wire
 from ols_board.board import EMULATOR
 
 pioemu = pytest.importorskip("pioemu", reason="needs PyPI rp2040-pio-emulator")
+from ols_board import oracle  # noqa: E402, needs pioemu
 
 CYCLES = 400
 PROGRAMS = 150
@@ -64,3 +68,80 @@ def test_random_programs_change_pins_as_an_independent_emulator_has_it():
         assert edges == oracle_edges(case), f"seed {seed}"
         changes += len(edges)
     assert changes > 20 * PROGRAMS
+
+
+def slot(kind, exposure_ticks, period_ticks, seed, **more):
+    pick = random.Random(seed)
+    bits = [0] * 176 if kind == wire.DARK else [pick.randint(0, 1) for _ in range(156)] + [0] * 20
+    return {"kind": kind, "trigger_mask": 15, "exposure_ticks": exposure_ticks, "period_ticks": period_ticks,
+            "bits": bits, **more}
+
+
+def grey_slot(planes, unit_ticks, period_ticks, seed):
+    pick = random.Random(seed)
+    levels = [pick.randrange(1 << planes) for _ in range(156)] + [0] * 20
+    return {"kind": wire.BASIS, "trigger_mask": 1, "planes": planes, "exposure_ticks": unit_ticks * ((1 << planes) - 1),
+            "period_ticks": period_ticks, "levels": levels}
+
+
+KINDS = {
+    "on/off": {"slots": [slot(wire.BASIS, 40, 1400, 1), slot(wire.TRACKING, 1240, 2000, 2), slot(wire.DARK, 900, 1500, 3),
+                         slot(wire.MATTE, 1300, 1700, 4)]},
+    "grey": {"slots": [grey_slot(4, 10, 5500, 5), slot(wire.BASIS, 700, 1500, 6), grey_slot(2, 500, 3500, 7)]},
+    "offsets": {"slots": [slot(wire.BASIS, 1000, 3000, 8, trigger_offset_ticks=-150), slot(wire.DARK, 900, 2600, 9),
+                          slot(wire.TRACKING, 100, 4000, 10, trigger_offset_ticks=90), slot(wire.DARK, 900, 2800, 11)],
+                "lead_ticks": 1100,
+                "triggers": [{"offset_ticks": -808}, {"offset_ticks": 212, "width_ticks": 16},
+                             {"skip_kinds": 0b1101, "offset_ticks": -40, "width_ticks": 1500},
+                             {"offset_ticks": 500, "width_ticks": 300, "active_low": 1}]},
+}
+
+
+@pytest.mark.parametrize("start", (wire.BY_COMMAND, wire.BY_EDGE), ids=("command", "genlock"))
+@pytest.mark.parametrize("kind", KINDS)
+def test_slots_of_each_kind_change_every_pin_when_an_independent_emulator_does(emulated, kind, start, tmp_path):
+    program = {"cycles": 2 if start == wire.BY_COMMAND else 1, "chain_bits": 176, **KINDS[kind]}
+    edge = 400 * 125_000
+    board = emulated(*(["--inject", f"genlock@{edge}"] if start == wire.BY_EDGE else []), trace=True)
+    link = board.plug()
+    link.load(program)
+    link.arm(start=start)
+    link.ask(wire.START)
+    while (status := link.status())["state"] in (wire.WAITING, wire.PLAYING):
+        link.usb.read(timeout_us=1_000)
+    assert (status["state"], status["fault"]) == (wire.DONE, 0)
+    board.stop()
+
+    genlock_tick = 3700 if start == wire.BY_EDGE else None
+    wanted = oracle.play(program, oracle.cycle_words(program, tmp_path), genlock_tick)
+    changes = [change for change in check_trace.read_vcd(board.trace) if change[0] > 0]
+    first_latch = next(tick for tick, name, level in changes if name == "LATCH" and level)
+    assert wanted["LATCH"][0][1] == 1
+    shift = first_latch - wanted["LATCH"][0][0]
+    if genlock_tick is not None:
+        assert shift == edge - genlock_tick
+    for name, edges in wanted.items():
+        low = name.startswith("TRIG") and check_trace.trigger_of(program | {"triggers": program.get("triggers", [])},
+                                                                 int(name[4])).get("active_low", 0)
+        found = [(tick - shift, level ^ low) for tick, which, level in changes if which == name]
+        # Arming, long before, sends the first pattern, and takes an inverted pad to its idle level.
+        if name in ("DATA", "CLK"):
+            edges, found = ([edge for edge in some if edge[0] > 3000] for some in (edges, found))
+        assert found[low:] == edges, name
+    assert sum(map(len, wanted.values())) > 1500
+
+
+@pytest.mark.parametrize("debounce_ticks", (4, 6, 50))
+def test_an_edge_gets_through_when_it_lasts_as_long_as_it_must_and_is_counted_once(debounce_ticks):
+    pick = random.Random(debounce_ticks)
+    genlock, tick, wanted = [], 100, []
+    for _ in range(60):
+        high = debounce_ticks + pick.randrange(-3, 4)
+        genlock += [tick, tick + high]
+        if high >= debounce_ticks:
+            wanted.append(tick + debounce_ticks + 4)
+            genlock[-1] += debounce_ticks  # and the fall, long enough to be one
+        tick = genlock[-1] + 2 * debounce_ticks + pick.randrange(20, 40)
+    edges, pushed = oracle.debounce(debounce_ticks, genlock, tick)
+    assert edges == [edge for rise in zip(wanted, edges[1::2]) for edge in rise] and len(edges) == 2 * len(wanted)
+    assert pushed == len(wanted) and 10 < len(wanted) < 50

@@ -58,7 +58,7 @@ class Link : public testing::Test {
     }
 
     Reply arm(uint32_t heartbeat_ticks = 0) {
-        return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks, OLS_START_BY_COMMAND, {}}));
+        return ask(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks, OLS_START_BY_COMMAND, {}, 0}));
     }
 
     ols_status_reply status() { return ask(OLS_STATUS).as<ols_status_reply>(); }

@@ -182,6 +182,34 @@ TEST(Board, the_trigger_log_is_read_entry_by_entry) {
     EXPECT_EQ(uint64_t(log->entries[2].rise_ticks), 2000u);
 }
 
+TEST(Board, a_log_that_is_far_behind_is_asked_for_by_four_messages_in_one_write) {
+    constexpr uint32_t fired = 1000;
+    std::vector<uint32_t> asked;
+    size_t writes = 0;
+    auto board = connect([&](uint16_t, const Bytes& payload) {
+        ols_read_trigger_log what;
+        std::memcpy(&what, payload.data(), sizeof what);
+        asked.push_back(what.first_counter);
+        const uint32_t count = std::min<uint32_t>(what.entries_max, fired - what.first_counter);
+        Bytes reply = bytes_of(ols_trigger_log_reply{what.first_counter, fired, 0, uint16_t(count), 0});
+        for (uint32_t i = 0; i < count; ++i) {
+            const Bytes entry = bytes_of(ols_trigger_log_entry{0, what.first_counter + i, 0, 0, 1, 0});
+            reply.insert(reply.end(), entry.begin(), entry.end());
+        }
+        return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};
+    });
+    uint32_t next = 0, known = 0;
+    for (; next < fired; ++writes) {
+        const auto log = board->read_trigger_log(next, known);
+        ASSERT_TRUE(log.ok()) << log.error().message;
+        for (const auto& entry : log->entries) ASSERT_EQ(uint32_t(entry.counter), next++);
+        known = log->next_counter;
+    }
+    EXPECT_EQ(std::vector<uint32_t>(asked.begin(), asked.begin() + 5), (std::vector<uint32_t>{0, 48, 96, 144, 192}));
+    EXPECT_EQ(writes, 7u);         // one message, four times four, three, and the rest
+    EXPECT_EQ(asked.size(), 21u);  // 20 full messages and the rest
+}
+
 TEST(Board, a_trigger_log_whose_length_lies_is_an_error) {
     auto board = connect([](uint16_t, const Bytes&) {
         return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, bytes_of(ols_trigger_log_reply{0, 9, 0, 9, 0})};

@@ -16,8 +16,8 @@ import board_pins  # noqa: E402
 BOARDS = sorted((ROOT / 'firmware' / 'boards').glob('*.toml'))
 BOARD_IDS = [path.stem for path in BOARDS]
 
-# Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 22 on pins 1 to 29, every fifth pair of which has a ground.
-PICO_PIN = {gpio: pin for gpio, pin in enumerate([pin for pin in range(1, 30) if pin not in (3, 8, 13, 18, 23, 28)])}
+# Raspberry Pi Pico datasheet, figure 2: GPIO 0 to 22 on pins 1 to 29, those ending in 3 and 8 being grounds; 30 is RUN.
+PICO_PIN = dict(enumerate(pin for pin in range(1, 30) if pin % 5 != 3)) | {26: 31, 27: 32, 28: 34}
 # Adafruit's schematic of the Feather RP2040 CAN, sheet 1: headers JP1 and JP3.
 FEATHER_PIN = {'TX': 0, 'RX': 1, 'SDA': 2, 'SCL': 3, 'D4': 4, 'D5': 5, 'D6': 6, 'MISO': 8, 'D9': 9, 'D10': 10, 'D11': 11,
                'D12': 12, 'D13': 13, 'SCK': 14, 'MOSI': 15, 'D24': 24, 'D25': 25, 'A0': 26, 'A1': 27, 'A2': 28, 'A3': 29}
@@ -62,11 +62,13 @@ def test_the_feathers_header_pins_are_those_of_its_schematic():
 
 
 @pytest.mark.parametrize('change, message', [
-    (lambda b: b['outputs']['TRIG2'].update(gpio=28), 'consecutive'),
-    (lambda b: b['stop_inputs']['OPEN_LAMP'].update(gpio=28), 'consecutive'),
+    (lambda b: b['outputs']['TRIG2'].update(gpio=24), 'consecutive'),
+    (lambda b: b['stop_inputs']['OPEN_LAMP'].update(gpio=24), 'consecutive'),
     (lambda b: b['inputs']['GENLOCK'].update(gpio=5), 'GPIO 5 is both LIGHT_EN and GENLOCK'),
     (lambda b: b['inputs']['GENLOCK'].update(gpio=30), 'GPIO 0 to 29'),
     (lambda b: b['outputs'].pop('SYNC'), r'\[outputs\] must name'),
+    (lambda b: b['outputs'].pop('PHOTO'), r'\[outputs\] must name'),
+    (lambda b: b['outputs']['READY'].update(gpio=23), 'consecutive'),
     (lambda b: b.update(name='a_name_of_more_than_15'), 'longer than the 15 bytes'),
     (lambda b: b['shift'].update(chain_bits=257), '1 to 256'),
 ])
@@ -78,10 +80,16 @@ def test_pins_that_no_firmware_could_drive_are_refused(pico, change, message):
         board_pins.check(wrong)
 
 
+def test_a_board_may_have_no_ready(pico):
+    del pico['outputs']['READY']
+    board_pins.check(pico)
+    assert 'READY' not in board_pins.header(pico) + board_pins.table([pico]) + board_pins.boards_json([pico])
+
+
 @pytest.mark.parametrize('path', BOARDS, ids=BOARD_IDS)
 def test_the_compiler_reads_the_header_as_the_source_says(path, tmp_path):
     board = board_pins.read_board(path)
-    names = ['DATA', 'CLK', 'LATCH', 'LIGHT_EN', 'TRIG0', 'SYNC', 'TIMELINE', 'STOP_INPUTS', 'GENLOCK']
+    names = ['DATA', 'CLK', 'LATCH', 'LIGHT_EN', 'TRIG0', 'SYNC', 'TIMELINE', 'STOP_INPUTS', 'GENLOCK', 'PHOTO']
     program = tmp_path / 'print.c'
     (tmp_path / 'board_pins.h').write_text(board_pins.header(board))
     program.write_text('#include <stdio.h>\n#include "board_pins.h"\n'
@@ -94,7 +102,8 @@ def test_the_compiler_reads_the_header_as_the_source_says(path, tmp_path):
     pins = pins_of(board)
     pins.update(TIMELINE=pins['LATCH'], STOP_INPUTS=pins['ESTOP'])
     assert (name, gpios) == (path.stem, [pins[signal]['gpio'] for signal in names])
-    assert {gpio for gpio in range(32) if mask >> gpio & 1} == {pin['gpio'] for pin in board['outputs'].values()}
+    assert {gpio for gpio in range(32) if mask >> gpio & 1} == \
+        {pin['gpio'] for signal, pin in board['outputs'].items() if signal != 'PHOTO'}  # which the other PIO block drives
 
 
 @pytest.mark.parametrize('name', BOARD_IDS)

@@ -28,13 +28,17 @@ pioasm = tool('pioasm')
 def independent(source):
     """Words by adafruit_pioasm, which takes one program at a time, and only the directives of the language's core."""
     source = re.sub(r'(;|//).*', '', source)
+    defines = dict(re.findall(r'^\s*\.define\s+public\s+(\w+)\s+(\d+)', source, flags=re.M))
     source = re.sub(r'^\s*\.define.*$', '', source, flags=re.M).replace('public ', '')
+    for name, value in defines.items():
+        source = re.sub(rf'\[{name} - (\d+)\]', lambda match: f'[{int(value) - int(match[1])}]', source)
     return list(adafruit_pioasm.assemble(source))
 
 
-@pytest.mark.parametrize('number, name', [(0, 'timeline'), (1, 'shifter'), (2, 'guard'), (3, 'witness')])
+@pytest.mark.parametrize('number, name', [(0, 'timeline'), (1, 'shifter'), (2, 'guard'), (3, 'witness'),
+                                          (4, 'light_watch'), (5, 'receptor')])
 def test_pulse_pio_assembles_to_the_words_of_an_independent_assembler(number, name):
-    program = pioasm.parse(PULSE)[number]
+    program = pioasm.parse(PULSE, {})[number]
     assert program.name == name
     source = '.program' + PULSE.split('.program')[number + 1]
     assert program.assemble() == independent(source)
@@ -56,7 +60,7 @@ EVERY_INSTRUCTION = [
                                                (' side 2 [7]', '.side_set 2')])
 def test_each_instruction_encodes_as_an_independent_assembler_has_it(instruction, suffix, directive):
     source = f'.program p\n{directive}\nnop{" side 0" if directive else ""}\nhere:\n{instruction}{suffix}\n'
-    assert pioasm.parse(source)[0].assemble() == independent(source)
+    assert pioasm.parse(source, {})[0].assemble() == independent(source)
 
 
 @pytest.mark.parametrize('line, message', [
@@ -70,13 +74,21 @@ def test_each_instruction_encodes_as_an_independent_assembler_has_it(instruction
 ])
 def test_a_wrong_line_is_named(line, message):
     with pytest.raises(pioasm.AssemblyError, match=f'line 3: .*{message}'):
-        for program in pioasm.parse(f'.program p\n\n{line}\n'):
+        for program in pioasm.parse(f'.program p\n\n{line}\n', {}):
             program.assemble()
+
+
+def test_a_define_can_be_replaced_and_an_unknown_one_is_refused():
+    source = '.program p\n.define public WAIT_TICKS 4\nnop [WAIT_TICKS - 1]\n'
+    (four,), (nine,) = (pioasm.parse(source, replaced)[0].assemble() for replaced in ({}, {'WAIT_TICKS': 9}))
+    assert (four >> 8 & 31, nine >> 8 & 31) == (3, 8)
+    with pytest.raises(pioasm.AssemblyError, match='nothing defines WAITING'):
+        pioasm.parse(source, {'WAITING': 9})
 
 
 def test_a_program_longer_than_the_block_is_refused():
     with pytest.raises(pioasm.AssemblyError, match='33 instructions'):
-        pioasm.parse('.program p\n' + 'nop\n' * 33)[0].assemble()
+        pioasm.parse('.program p\n' + 'nop\n' * 33, {})[0].assemble()
 
 
 # From here on: the built image.

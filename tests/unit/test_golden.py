@@ -34,19 +34,19 @@ TRIGGERS = trigger(-2000, 0, 0, 0) + trigger(100, 6250, 0b1101, 1) + 2 * trigger
 # name: (type, payload), all with request id 0x1234.
 MESSAGES = {
     'hello': (0x01, struct.pack('<Q', HASH)),
-    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHHI16s', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
-                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750, 7,
+    'hello_reply': (0x01 | REPLY, struct.pack('<Q24s8sIIIHHIIHHII16s', HASH, fixed('1.2.3', 24), bytes(range(0xe0, 0xe8)),
+                                              0xdeadbeef, 125_000_000, 1, 176, 1024, 1259, 27, 171, 750, 7, 11,
                                               fixed('pico', 16))),
     'load_begin': (0x02, struct.pack('<HHIIII', 2, 176, 1000, len(PROGRAM), zlib.crc32(PROGRAM), 2500) + TRIGGERS),
     'load_begin_reply': (0x02 | REPLY, b''),
     'load_chunk': (0x03, struct.pack('<I', 0) + PROGRAM),
     'load_end': (0x04, b''),
-    'arm': (0x05, struct.pack('<IB3x', 12500000, 1)),
+    'arm': (0x05, struct.pack('<IB3xI', 12500000, 2, 1250)),
     'start': (0x06, b''),
     'stop': (0x07, b''),
     'status': (0x08, b''),
-    'status_reply': (0x08 | REPLY, struct.pack('<BBHIQQIIIIB3x', 5, 2, 179, 0xdeadbeef, 0x1_0000_0001, 0x2_0000_0002,
-                                               1234567, 6858, 17, zlib.crc32(PROGRAM), 2)),
+    'status_reply': (0x08 | REPLY, struct.pack('<BBHIQQIIIIB3xII', 5, 2, 179, 0xdeadbeef, 0x1_0000_0001, 0x2_0000_0002,
+                                               1234567, 6858, 17, zlib.crc32(PROGRAM), 2, 400, 3)),
     'read_trigger_log': (0x09, struct.pack('<IHH', 358, 48, 0)),
     'trigger_log_reply': (0x09 | REPLY, struct.pack('<IIIHH', 358, 360, 3, 2, 0) +
                           struct.pack('<QIIHBB', 20717472, 358, 1, 178, 1, 0) +

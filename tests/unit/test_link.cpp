@@ -215,8 +215,8 @@ TEST_F(Link, wrong_lengths_and_unknown_messages_are_refused) {
 
 TEST_F(Link, a_start_by_edge_waits_for_it_and_counts_from_it) {
     ASSERT_TRUE(load(program(18), 1).ok(OLS_LOAD_END));
-    EXPECT_EQ(ask(OLS_ARM, bytes_of(ols_arm{0, 2, {}})).error(), OLS_ERROR_BAD_PROGRAM);
-    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    EXPECT_EQ(ask(OLS_ARM, bytes_of(ols_arm{0, 3, {}, 0})).error(), OLS_ERROR_BAD_PROGRAM);
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}, 0})).ok(OLS_ARM));
     board_host_genlock();
     EXPECT_EQ(status().state, OLS_STATE_ARMED) << "an edge before the start means nothing";
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
@@ -232,6 +232,47 @@ TEST_F(Link, a_start_by_edge_waits_for_it_and_counts_from_it) {
     board_host_run_us(20'000);
     EXPECT_EQ(status().state, OLS_STATE_DONE);
     EXPECT_EQ(status().triggers_fired, 18u);
+}
+
+TEST_F(Link, each_cycle_waits_for_an_edge_and_edges_during_play_are_counted_as_missed) {
+    const uint64_t cycle_us = 18 * 57'870 / 125;
+    const ols_arm by_edges{0, OLS_START_EACH_CYCLE_BY_EDGE, {}, 1250};
+    ASSERT_TRUE(load(program(18), 3).ok(OLS_LOAD_END));
+    for (const uint32_t wrong : {0, 2, 1251}) {
+        const ols_arm refused{0, OLS_START_EACH_CYCLE_BY_EDGE, {}, wrong};
+        EXPECT_EQ(ask(OLS_ARM, bytes_of(refused)).error(), OLS_ERROR_BAD_PROGRAM) << wrong;
+    }
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(by_edges)).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    for (uint32_t cycle = 0; cycle < 3; ++cycle) {
+        board_host_run_us(70'000 + 12'345 * cycle);
+        EXPECT_EQ(status().state, cycle == 0 ? OLS_STATE_WAITING : OLS_STATE_PLAYING);
+        EXPECT_EQ(status().triggers_fired, 18 * cycle) << "no cycle plays without its edge";
+        board_host_genlock();
+        board_host_run_us(cycle_us / 2);
+        if (cycle == 1) board_host_genlock();
+        board_host_run_us(cycle_us / 2 + 1000);
+    }
+    const ols_status_reply done = status();
+    EXPECT_EQ(done.state, OLS_STATE_DONE);
+    EXPECT_EQ(done.fault, OLS_FAULT_NONE) << "cycles may begin whenever they like";
+    EXPECT_EQ(done.triggers_fired, 54u);
+    EXPECT_EQ(done.edges_seen, 4u);
+    EXPECT_EQ(done.edges_missed, 1u);
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(by_edges)).ok(OLS_ARM));
+    EXPECT_EQ(status().edges_seen, 0u);
+}
+
+TEST_F(Link, cycles_that_wait_for_edges_are_not_swapped) {
+    ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_EACH_CYCLE_BY_EDGE, {}, 4})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    board_host_genlock();
+    board_host_run_us(2'000);
+    ASSERT_TRUE(load(program(12), 1).ok(OLS_LOAD_END));
+    EXPECT_EQ(ask(OLS_SWAP).error(), OLS_ERROR_BAD_STATE);
+    ASSERT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
+    EXPECT_EQ(status().program_crc32, begin_for(program(12), 1).program_crc32) << "the next program is the one to arm";
 }
 
 TEST_F(Link, half_a_message_of_a_host_that_went_away_does_not_confuse_the_next) {

@@ -67,7 +67,7 @@ TEST(Schedule, knows_every_trigger_of_random_programs_and_the_time_to_the_next) 
         std::vector<int64_t> rises;
         int64_t end_ticks = 0;
         add_rises(*played, slots, cycles, end_ticks, rises);
-        schedule_begin(played.get());
+        schedule_begin(played.get(), false);
         for (size_t n = 0; n < rises.size(); n++) {
             ASSERT_TRUE(take(rises[n])) << "round " << round << ", trigger " << n;
             ASSERT_EQ(schedule_ticks_to_next(), n + 1 < rises.size() ? uint32_t(rises[n + 1] - rises[n]) : 0u);
@@ -91,7 +91,7 @@ TEST(Schedule, follows_swaps_also_from_and_to_programs_that_never_trigger) {
             programs.push_back(sequence_of(slots.back(), n < 3 ? 0 : cycles.back(), 0, 0));
         }
         int64_t now_ticks = 0;
-        schedule_begin(programs[0].get());
+        schedule_begin(programs[0].get(), false);
         bool settle_due = false;  // since the swap that came last
         for (int n = 0; n < 4; n++) {
             std::vector<int64_t> rises;
@@ -131,7 +131,7 @@ TEST(Schedule, notices_the_very_trigger_that_is_off_by_more_than_the_tolerance_a
         const size_t wrong = 1 + pick() % (rises.size() - 1);
         const int64_t slip_ticks = (4 + int64_t(pick() % 1000)) * (pick() % 2 ? 1 : -1);
         const int64_t jitter_ticks = pick() % 2;  // a stamp is a floor to two ticks
-        schedule_begin(played.get());
+        schedule_begin(played.get(), false);
         for (size_t n = 0; n < wrong; n++) ASSERT_TRUE(take(rises[n] + jitter_ticks * int64_t(n % 2)));
         EXPECT_FALSE(take(rises[wrong] + slip_ticks + (slip_ticks > 0 ? 1 : -1))) << slip_ticks;
     }
@@ -140,7 +140,7 @@ TEST(Schedule, notices_the_very_trigger_that_is_off_by_more_than_the_tolerance_a
 TEST(Schedule, notices_a_trigger_that_has_been_left_out) {
     const Slots slots = {{OLS_BASIS, 1, 0, 0, 200, 5'000, 0}, {OLS_BASIS, 1, 0, 0, 200, 6'000, 0}};
     const auto played = sequence_of(slots, 0, 0, 0);
-    schedule_begin(played.get());
+    schedule_begin(played.get(), false);
     EXPECT_TRUE(take(0));
     EXPECT_EQ(schedule_ticks_to_next(), 5'000u);
     EXPECT_FALSE(take(11'000));
@@ -149,7 +149,7 @@ TEST(Schedule, notices_a_trigger_that_has_been_left_out) {
 TEST(Schedule, gives_no_time_to_a_trigger_that_32_bits_of_ticks_do_not_reach) {
     const Slots slots = {{OLS_BASIS, 1, 0, 0, 200, 3'000'000'000, 0}, {OLS_BASIS, 0, 0, 0, 200, 3'000'000'000, 0}};
     const auto played = sequence_of(slots, 0, 0, 0);
-    schedule_begin(played.get());
+    schedule_begin(played.get(), false);
     EXPECT_TRUE(take(0));
     EXPECT_EQ(schedule_ticks_to_next(), 0u);
     EXPECT_TRUE(take(6'000'000'000)) << "and yet it is known";

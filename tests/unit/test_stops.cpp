@@ -165,11 +165,11 @@ TEST_F(Stops, a_program_that_lights_a_lamp_for_too_much_of_the_cycle_is_refused)
 
 TEST_F(Stops, a_stage_that_waits_for_an_edge_can_be_stopped_and_ends_dark_like_one_that_plays) {
     ASSERT_TRUE(load(program(18), 1).ok(OLS_LOAD_END));
-    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}, 0})).ok(OLS_ARM));
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     ASSERT_TRUE(ask(OLS_STOP).ok(OLS_STOP));
     EXPECT_EQ(status().state, OLS_STATE_LOADED);
-    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_BY_EDGE, {}, 0})).ok(OLS_ARM));
     ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
     board_host_detach();
     board_host_run_us(1'000);

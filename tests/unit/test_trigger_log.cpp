@@ -43,7 +43,7 @@ std::vector<ols_trigger_log_entry> read_all(uint32_t first, ols_trigger_log_repl
 
 TEST(TriggerLog, names_the_slot_and_cycle_of_each_trigger) {
     const auto played = sequence_of_four();
-    trigger_log_begin(played.get());
+    trigger_log_begin(played.get(), false);
     EXPECT_EQ(trigger_log_slot(), OLS_NO_SLOT);
     const uint64_t rises[] = {0, 50'000, 180'000, 260'000, 310'000, 440'000};
     for (const uint64_t rise : rises) EXPECT_TRUE(trigger_log_add(stamp_at(first_rise + rise), rise + 9000));
@@ -63,7 +63,7 @@ TEST(TriggerLog, names_the_slot_and_cycle_of_each_trigger) {
 TEST(TriggerLog, notices_a_trigger_that_is_not_where_it_was_scheduled) {
     for (const int64_t slip : {-1000, -4, 4, 1000}) {
         const auto played = sequence_of_four();
-        trigger_log_begin(played.get());
+        trigger_log_begin(played.get(), false);
         EXPECT_TRUE(trigger_log_add(stamp_at(20), 30));
         EXPECT_TRUE(trigger_log_add(stamp_at(50'020 + 2), 50'030)) << "the stamp's resolution is no slip";
         EXPECT_FALSE(trigger_log_add(stamp_at(uint64_t(180'020 + slip)), 180'030)) << slip;
@@ -72,7 +72,7 @@ TEST(TriggerLog, notices_a_trigger_that_is_not_where_it_was_scheduled) {
 
 TEST(TriggerLog, expects_each_trigger_at_its_own_offset) {
     const auto played = sequence_of({slot(1, 50'000, -4000), slot(3, 60'000, 2500), slot(2, 70'000), slot(1, 80'000)});
-    trigger_log_begin(played.get());
+    trigger_log_begin(played.get(), false);
     EXPECT_TRUE(trigger_log_add(stamp_at(20), 30));
     EXPECT_TRUE(trigger_log_add(stamp_at(20 + 50'000 + 6500), 60'000));
     EXPECT_FALSE(trigger_log_add(stamp_at(20 + 180'000), 190'000)) << "that one is due at 184 000";
@@ -80,7 +80,7 @@ TEST(TriggerLog, expects_each_trigger_at_its_own_offset) {
 
 TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
     const auto played = sequence_of_four();
-    trigger_log_begin(played.get());
+    trigger_log_begin(played.get(), false);
     bool on_time = true;
     uint64_t rise = 20, n = 0;
     for (const uint64_t periods[] = {50'000, 130'000, 80'000}; on_time && n < 20; n++) {
@@ -91,9 +91,25 @@ TEST(TriggerLog, notices_slow_drift_though_no_single_period_is_off) {
     EXPECT_LE(n, 6u);
 }
 
+TEST(TriggerLog, cycles_that_wait_may_begin_at_any_time_but_not_slip_within) {
+    const auto played = sequence_of_four();
+    trigger_log_begin(played.get(), true);
+    const uint64_t begins[] = {20, 300'000, 123'456'790};
+    for (const uint64_t begin : begins)
+        for (const uint64_t rise : {0, 50'000, 180'000})
+            EXPECT_TRUE(trigger_log_add(stamp_at(begin + rise), begin + rise + 100)) << begin << " " << rise;
+    const uint64_t late = 200'000'000;
+    EXPECT_TRUE(trigger_log_add(stamp_at(late), late));
+    EXPECT_FALSE(trigger_log_add(stamp_at(late + 50'004), late + 50'100));
+    ols_trigger_log_reply header;
+    const auto entries = read_all(0, header);
+    EXPECT_EQ(entries[6].rise_ticks, begins[2]);
+    EXPECT_EQ(entries[6].cycle, 2u);
+}
+
 TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
     const auto slow = sequence_of({slot(1, 4'000'000'001u)});  // 32 s; the stamps wrap every 68.7 s
-    trigger_log_begin(slow.get());
+    trigger_log_begin(slow.get(), false);
     for (uint64_t n = 0; n < 20; n++) {
         const uint64_t rise = first_rise + n * 4'000'000'001u;
         EXPECT_TRUE(trigger_log_add(stamp_at(rise), rise + (n % 5) * 500'000'000));  // read up to 16 s late
@@ -106,7 +122,7 @@ TEST(TriggerLog, rise_times_outlast_the_wrap_of_the_stamps) {
 
 TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
     const auto fast = sequence_of({slot(1, 2000)});
-    trigger_log_begin(fast.get());
+    trigger_log_begin(fast.get(), false);
     auto fire = [&, n = uint64_t(0)](int count) mutable {
         for (; count > 0; count--, n++) ASSERT_TRUE(trigger_log_add(stamp_at(n * 2000), n * 2000));
     };
@@ -125,7 +141,7 @@ TEST(TriggerLog, what_the_host_did_not_read_in_time_is_counted_as_lost) {
 
 TEST(TriggerLog, skipped_stamps_are_lost_but_the_slots_after_them_are_right) {
     const auto played = sequence_of_four();
-    trigger_log_begin(played.get());
+    trigger_log_begin(played.get(), false);
     EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
     trigger_log_skip(3);  // slots 1, 3, 0
     EXPECT_TRUE(trigger_log_add(stamp_at(20 + 310'000), 310'000));
@@ -141,7 +157,7 @@ TEST(TriggerLog, skipped_stamps_are_lost_but_the_slots_after_them_are_right) {
 
 TEST(TriggerLog, reading_past_the_end_gives_nothing) {
     const auto played = sequence_of_four();
-    trigger_log_begin(played.get());
+    trigger_log_begin(played.get(), false);
     EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
     ols_trigger_log_reply header;
     EXPECT_TRUE(read_all(7, header).empty());
@@ -151,7 +167,7 @@ TEST(TriggerLog, reading_past_the_end_gives_nothing) {
 TEST(TriggerLog, follows_a_swap_to_the_next_program_at_its_cycle) {
     const auto first = sequence_of_four();
     const auto second = sequence_of({slot(1, 30'000), slot(1, 40'000)});
-    trigger_log_begin(first.get());
+    trigger_log_begin(first.get(), false);
     EXPECT_TRUE(trigger_log_add(stamp_at(20), 20));
     trigger_log_swap(second.get(), 1);
     for (const uint64_t rise : {50'000, 180'000, 260'000, 290'000, 330'000})
@@ -170,12 +186,12 @@ TEST(TriggerLog, follows_a_swap_to_the_next_program_at_its_cycle) {
 TEST(TriggerLog, a_program_without_watched_triggers_is_passed_on_the_way_to_the_next) {
     const auto silent = sequence_of({slot(2, 50'000), slot(2, 50'000)});
     const auto second = sequence_of({slot(1, 30'000)});
-    trigger_log_begin(silent.get());
+    trigger_log_begin(silent.get(), false);
     trigger_log_swap(second.get(), 3);
     EXPECT_TRUE(trigger_log_add(stamp_at(300'020), 300'100));
     EXPECT_TRUE(trigger_log_add(stamp_at(330'020), 330'100));
     EXPECT_EQ(trigger_log_cycle(), 1u);
-    trigger_log_begin(silent.get());
+    trigger_log_begin(silent.get(), false);
     EXPECT_FALSE(trigger_log_add(stamp_at(20), 20)) << "without a swap, it is a trigger that nobody asked for";
 }
 

@@ -85,6 +85,7 @@ TEST(Wire, hello_and_its_reply) {
     reply.lamps_lit_max = 171;
     reply.lamp_duty_max_permille = 750;
     reply.edge_start_ticks = 7;
+    reply.cycle_edge_ticks = 11;
     strcpy(reply.board, "pico");
     expect_golden("hello_reply", OLS_HELLO | OLS_REPLY, join(reply));
 }
@@ -114,7 +115,7 @@ TEST(Wire, digests) {
 }
 
 TEST(Wire, arm) {
-    expect_golden("arm", OLS_ARM, join(ols_arm{12500000, OLS_START_BY_EDGE, {}}));
+    expect_golden("arm", OLS_ARM, join(ols_arm{12500000, OLS_START_EACH_CYCLE_BY_EDGE, {}, 1250}));
 }
 
 TEST(Wire, swap_reply) {
@@ -136,7 +137,9 @@ TEST(Wire, status_reply) {
                                         17,
                                         crc,
                                         OLS_NEXT_READY,
-                                        {}}));
+                                        {},
+                                        400,
+                                        3}));
 }
 
 TEST(Wire, trigger_log) {

@@ -125,13 +125,22 @@ class Link:
 
     def ask(self, message_type, payload=b""):
         """Sends a request and returns the reply's payload. Raises BoardError for an error reply."""
-        self.request_id = (self.request_id + 1) & 0xFFFF
-        status = self.usb.write(wire.frame(message_type, self.request_id, payload))
+        return self.ask_many(message_type, [payload])[0]
+
+    def ask_many(self, message_type, payloads):
+        """Sends several requests in one transfer, without waiting for the reply of each; returns their replies."""
+        first_id = self.request_id + 1
+        requests = [wire.frame(message_type, first_id + n & 0xFFFF, payload) for n, payload in enumerate(payloads)]
+        self.request_id = first_id + len(payloads) - 1 & 0xFFFF
+        status = self.usb.write(b"".join(requests))
         if status != OK:
             raise ConnectionError(f"transfer status {status}")
+        return [self._reply(message_type, first_id + n & 0xFFFF) for n in range(len(payloads))]
+
+    def _reply(self, message_type, request_id):
         while True:
             found = wire.take_frame(self.stream)
-            if found is not None and found[1] == self.request_id:
+            if found is not None and found[1] == request_id:
                 break
             status, data = self.usb.read()
             if status != OK:
@@ -147,13 +156,13 @@ class Link:
     def hello(self, layout_hash):
         names = ("layout_hash", "firmware_version", "board_id", "boot_nonce", "tick_hz", "capabilities", "chain_bits",
                  "slots_max", "shift_ticks", "slot_gap_ticks", "lamps_lit_max", "lamp_duty_max_permille",
-                 "edge_start_ticks", "board")
+                 "edge_start_ticks", "cycle_edge_ticks", "board")
         reply = self.ask(wire.HELLO, layout_hash.to_bytes(8, "little"))
         return dict(zip(names, wire.HELLO_REPLY.unpack(reply)))
 
     def status(self):
         names = ("state", "fault", "fault_slot", "boot_nonce", "fault_ticks", "now_ticks", "triggers_fired",
-                 "cycles_played", "log_entries_lost", "program_crc32", "next")
+                 "cycles_played", "log_entries_lost", "program_crc32", "next", "edges_seen", "edges_missed")
         return dict(zip(names, wire.STATUS_REPLY.unpack(self.ask(wire.STATUS))))
 
     def load(self, program, chunk_bytes=1000):
@@ -163,8 +172,8 @@ class Link:
             self.ask(wire.LOAD_CHUNK, offset.to_bytes(4, "little") + data[offset : offset + chunk_bytes])
         self.ask(wire.LOAD_END)
 
-    def arm(self, heartbeat_ticks=0, start=wire.BY_COMMAND):
-        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks, start))
+    def arm(self, heartbeat_ticks=0, start=wire.BY_COMMAND, debounce_ticks=0):
+        self.ask(wire.ARM, wire.ARM_REQUEST.pack(heartbeat_ticks, start, debounce_ticks))
 
     def play(self, program, heartbeat_ticks=0):
         self.load(program)

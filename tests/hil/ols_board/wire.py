@@ -16,11 +16,12 @@ FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost",
           "emergency stop", "over-temperature", "open lamp", "heartbeat", "over-duty")
 ERROR_BAD_STATE, ERROR_BAD_OFFSET, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 4, 5, 7, 8, 9
 
-HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHI16s")
-ARM_REQUEST = struct.Struct("<IB3x")
-BY_COMMAND, BY_EDGE = range(2)
-STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3x")
+HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHII16s")
+ARM_REQUEST = struct.Struct("<IB3xI")
+BY_COMMAND, BY_EDGE, EACH_CYCLE_BY_EDGE = range(3)
+STATUS_REPLY = struct.Struct("<BBHIQQIIIIB3xII")
 SWAP_REPLY = struct.Struct("<IB3x")
+READ_LOG = struct.Struct("<IH2x")
 LOG_REPLY = struct.Struct("<IIIHH")
 LOG_ENTRY = struct.Struct("<QIIHBB")
 READ_DIGESTS = 0x0C

@@ -43,13 +43,9 @@ export class Board {
   constructor(image, options) {
     this.#image = image;
     this.#options = options;
-<<<<<<< HEAD
     this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
-    this.#injections = [...options.injections];
-=======
     this.#injections = options.injections.map((injection) => ({ ...injection }));
->>>>>>> stops
     this.#logger = onceLogger(options.log);
     if (options.canBus) {
       if (options.pins.can === null) throw new Error(`board "${options.pins.name}" has no CAN controller`);

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// stagectl play: plays a sequence without recording it, and follows every trigger.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "capture/board_log.hpp"
+#include "capture/recorder.hpp"
+#include "stagectl/session.hpp"
+#include "stagectl/verbs.hpp"
+
+namespace ols {
+
+namespace {
+
+struct Options {
+    LinkOptions links;
+    std::string sequence;
+    int cycles = -1;
+    bool json = false;
+};
+
+// What the board's log told; with `json`, prints a line for each trigger.
+struct Account {
+    uint64_t triggers = 0, unseen = 0;  // those that were gone from the log before they were read
+    std::string end;
+
+    void add(const LogNews& news, bool json) {
+        for (const auto& entry : news.entries) {
+            unseen += entry.counter - (triggers + unseen);
+            ++triggers;
+            if (json)
+                fmt::print("{}\n", nlohmann::json{{"counter", uint32_t(entry.counter)},
+                                                  {"cycle", uint32_t(entry.cycle)},
+                                                  {"slot", uint16_t(entry.slot)},
+                                                  {"tick", uint64_t(entry.rise_ticks)}}
+                                       .dump());
+        }
+    }
+};
+
+Result<Sequence> open_sequence(const Options& options, const StageConfig& stage) {
+    auto config = read_sequence(options.sequence);
+    if (!config.ok()) return config.error();
+    if (options.cycles >= 0) config->cycles = options.cycles;
+    return compile_sequence(*config, stage);
+}
+
+void follow(Board& board, bool json, Account& account) {
+    static const std::atomic<uint64_t> no_frames{0};
+    const BoardLog log(
+        board, no_frames, stop_on_signal(), [&](const LogNews& news) { account.add(news, json); },
+        [&](std::string why) { account.end = std::move(why); });
+    // Its destructor waits for the end.
+}
+
+Result<int> run(const Options& options) {
+    const auto stage = open_stage(options.links);
+    if (!stage.ok()) return stage.error();
+    const auto sequence = open_sequence(options, *stage);
+    if (!sequence.ok()) return sequence.error();
+    auto board = open_board(options.links, *stage);
+    if (!board.ok()) return board.error();
+    if (const Status status = start_board(*board, *sequence, *stage); !status.ok()) return status.error();
+    Account account;
+    follow(*board, options.json, account);
+    const auto status = board->status();
+    if (!status.ok()) return status.error();
+    fmt::print(stderr, "{} triggers", account.triggers);
+    if (account.unseen) fmt::print(stderr, ", {} more were gone before they were read", account.unseen);
+    if (sequence->config.playback.start == StartSource::photo)
+        fmt::print(stderr, "; {} edges, {} of them missed", uint32_t(status->edges_seen),
+                   uint32_t(status->edges_missed));
+    fmt::print(stderr, "\n");
+    if (status->fault != OLS_FAULT_NONE) return fail(account.end);
+    return account.unseen ? 2 : 0;
+}
+
+}  // namespace
+
+void add_play_verb(CLI::App& app, int& exit_code) {
+    auto options = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("play", "play a sequence without recording it");
+    verb->footer(
+        "Example: stagectl play examples/sequence_photo.toml --board socket:run/board.sock --json\n"
+        "Ctrl-C turns the light off. Exit codes: 0 played, or stopped by you; 1 an error or a fault; 2 triggers were "
+        "not seen.\n"
+        "Flashing light can trigger seizures: see `stagectl sequence`.");
+    verb->add_option("sequence", options->sequence, "sequence.toml")->required();
+    options->links.add_to(*verb, false);
+    verb->add_option("--cycles", options->cycles,
+                     "how often to play the cycle, 0 until stopped; otherwise as the sequence says")
+        ->check(CLI::Range(0, OLS_CYCLES_MAX));
+    verb->add_flag("--json", options->json, "print a JSON line for each trigger");
+    verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
+}
+
+}  // namespace ols
