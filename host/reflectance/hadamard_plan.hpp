@@ -14,15 +14,16 @@
 namespace ols {
 
 struct HadamardPlan {
-    SumPlan plan{0};  // inputs: the basis's rows; outputs: all z but that of the column of ones, in order of H's columns
-    int order = 0;    // n, with H H' = n I, so that the sum of all z^2 is n times the sum of all y^2
+    SumPlan plan{
+        0};         // inputs: the basis's rows; outputs: all z but that of the column of ones, in order of H's columns
+    int order = 0;  // n, with H H' = n I, so that the sum of all z^2 is n times the sum of all y^2
     std::vector<int> lamp_output;  // by lamp: the output that it is, or -1 for the sum of all rows
     // The lamp with output -1, if there is one, is the sum of all rows plus `extra_weight` times row `extra_row`.
     int extra_row = 0, extra_weight = 0;
 };
 
-// Nothing for a basis whose structure is not known: `single`, and any from a file. The plan's matrix equals the basis's
-// weights, which is checked.
+// Nothing for a basis whose structure is not known: `single`, any from a file, and one that only has a known name, for
+// the plan's matrix is compared with the basis's weights.
 std::optional<HadamardPlan> hadamard_plan(const Basis& basis);
 
 }  // namespace ols

@@ -235,7 +235,8 @@ void load_long(const HadamardJob& job, size_t begin, size_t count, int32_t* plac
     std::fill_n(sums, tile_samples, 0);
     for (size_t r = 0; r < rows; ++r) {
         int32_t* const to = places + r * tile_samples;
-        for (size_t i = 0; i < count; ++i) to[i] = job.rows16.empty() ? job.rows32[r][begin + i] : job.rows16[r][begin + i];
+        for (size_t i = 0; i < count; ++i)
+            to[i] = job.rows16.empty() ? job.rows32[r][begin + i] : job.rows16[r][begin + i];
         std::fill(to + count, to + tile_samples, 0);
         for (size_t i = 0; i < tile_samples; ++i) sums[i] += to[i];
     }

@@ -11,7 +11,8 @@
 
 namespace ols {
 
-constexpr size_t tile_samples = 64;  // one cache line pair of int16 a row; all of a plan's places fit the nearest caches
+constexpr size_t tile_samples =
+    64;  // one cache line pair of int16 a row; all of a plan's places fit the nearest caches
 
 struct HadamardJob {
     const HadamardPlan* plan;

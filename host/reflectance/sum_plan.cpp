@@ -151,7 +151,8 @@ SumCode lay_out(const SumPlan& plan, const std::vector<int>& kept) {
         const size_t value = size_t(plan.inputs()) + s;
         place[value] = free.back();
         free.pop_back();
-        out.code.insert(out.code.end(), {place[value], uint16_t(std::max<size_t>(plus, 1)), uint16_t(terms.size() - plus)});
+        out.code.insert(out.code.end(),
+                        {place[value], uint16_t(std::max<size_t>(plus, 1)), uint16_t(terms.size() - plus)});
         out.code.insert(out.code.end(), sources.begin(), sources.end());
     }
     for (const int value : plan.outputs()) out.outputs.push_back(place[value]);

@@ -51,10 +51,10 @@ class SumPlan {
 
 // A plan laid out for running: values share places when they are not needed at the same time.
 struct SumCode {
-    int places = 0;                  // vectors of scratch
-    std::vector<uint16_t> code;      // for each sum: place, count of plus terms, count of minus terms, their places
-    std::vector<uint16_t> outputs;   // places; they hold until the end
-    uint16_t zero_place = 0;         // holds zeros, for sums without a plus term
+    int places = 0;                 // vectors of scratch
+    std::vector<uint16_t> code;     // for each sum: place, count of plus terms, count of minus terms, their places
+    std::vector<uint16_t> outputs;  // places; they hold until the end
+    uint16_t zero_place = 0;        // holds zeros, for sums without a plus term
 };
 
 // The inputs have places 0..inputs - 1 at the begin; those of `kept` to the end.
