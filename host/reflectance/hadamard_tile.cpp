@@ -44,15 +44,19 @@ void play(const SumCode& plan, Lane* HWY_RESTRICT places) {
             const uint16_t* const next = minus + op[2];
             decltype(hn::Zero(d)) sum[at_once];
             const Lane* from = base + op[3] * tile_samples;
+            HWY_UNROLL(4)
             for (size_t v = 0; v < at_once; ++v) sum[v] = hn::Load(d, from + v * lanes);
             for (op += 4; op < minus; ++op) {
                 from = base + *op * tile_samples;
+                HWY_UNROLL(4)
                 for (size_t v = 0; v < at_once; ++v) sum[v] = hn::Add(sum[v], hn::Load(d, from + v * lanes));
             }
             for (; op < next; ++op) {
                 from = base + *op * tile_samples;
+                HWY_UNROLL(4)
                 for (size_t v = 0; v < at_once; ++v) sum[v] = hn::Sub(sum[v], hn::Load(d, from + v * lanes));
             }
+            HWY_UNROLL(4)
             for (size_t v = 0; v < at_once; ++v) hn::Store(sum[v], d, to + v * lanes);
         }
     }
@@ -199,11 +203,15 @@ HWY_INLINE void store_lamp(const HadamardJob& job, size_t lamp, size_t at, size_
         return;
     }
     float* const to = job.lamps[lamp] + at;
+    const float* const factors = job.factors.data() + at;
+    const auto times = [&](size_t i) HWY_ATTR {
+        return hn::Mul(hn::ConvertTo(df, hn::Load(d, z + i)), hn::LoadU(df, factors + i));
+    };
     size_t i = 0;
-    for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d))
-        hn::StoreU(hn::Mul(hn::ConvertTo(df, hn::Load(d, z + i)), hn::LoadU(df, job.factors.data() + at + i)), df,
-                   to + i);
-    for (; i < count; ++i) to[i] = float(z[i]) * job.factors[at + i];
+    if (count == tile_samples && reinterpret_cast<uintptr_t>(to) % 64 == 0)
+        for (; i < tile_samples; i += hn::Lanes(d)) hn::Stream(times(i), df, to + i);  // not read again soon
+    for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) hn::StoreU(times(i), df, to + i);
+    for (; i < count; ++i) to[i] = float(z[i]) * factors[i];
 }
 
 // All lamps of a tile, from outputs in either width.
