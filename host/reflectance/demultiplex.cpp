@@ -1,20 +1,26 @@
 // SPDX-License-Identifier: MIT
-// The plain exact inversion: a small integer matrix product, tiled so that a tile of all rows stays in the second-level
-// cache (159 rows x 256 samples x 4 bytes = 163 KB) while every lamp is summed from it.
+// Two exact inversions: a plan of additions where the basis has a known structure (hadamard_plan.hpp), and for any other
+// a small integer matrix product, tiled so that a tile of all rows stays in the second-level cache (159 rows x 256
+// samples x 4 bytes = 163 KB) while every lamp is summed from it. Both give the same bits.
 #include "reflectance/demultiplex.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "reflectance/hadamard_tile.hpp"
 
 namespace ols {
 
 namespace {
 
-constexpr size_t tile_samples = 256;
+constexpr size_t block_samples = 256;
 constexpr int lamps_at_once = 4;  // share each load of a row
 
 // The type that row samples are summed in, and a vector of those: one AVX2 register, two of SSE2. Tiles are aligned for
@@ -34,16 +40,16 @@ struct Arithmetic<float> {
 template <typename Sample>
 using SumOf = typename Arithmetic<Sample>::Sum;
 
-// sums[lamp][p] of four lamps over one tile[row * tile_samples + p]; weights[row * lamps_at_once + lamp].
+// sums[lamp][p] of four lamps over one tile[row * block_samples + p]; weights[row * lamps_at_once + lamp].
 template <typename Sample>
 __attribute__((always_inline)) inline void sum_tile(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                                                    SumOf<Sample> (*sums)[tile_samples]) {
+                                                    SumOf<Sample> (*sums)[block_samples]) {
     using Vector = typename Arithmetic<Sample>::Vector;
-    for (size_t p = 0; p < tile_samples; p += sizeof(Vector) / sizeof(SumOf<Sample>)) {
+    for (size_t p = 0; p < block_samples; p += sizeof(Vector) / sizeof(SumOf<Sample>)) {
         // Four names instead of an array: the compiler keeps these in registers.
         Vector sum0{}, sum1{}, sum2{}, sum3{};
         for (int r = 0; r < rows; ++r) {
-            const Vector y = *reinterpret_cast<const Vector*>(tile + size_t(r) * tile_samples + p);
+            const Vector y = *reinterpret_cast<const Vector*>(tile + size_t(r) * block_samples + p);
             const auto* w = weights + size_t(r) * lamps_at_once;
             sum0 += y * w[0], sum1 += y * w[1], sum2 += y * w[2], sum3 += y * w[3];
         }
@@ -56,14 +62,14 @@ __attribute__((always_inline)) inline void sum_tile(const SumOf<Sample>* tile, i
 
 template <typename Sample>
 void sum_tile_portable(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                       SumOf<Sample> (*sums)[tile_samples]) {
+                       SumOf<Sample> (*sums)[block_samples]) {
     sum_tile<Sample>(tile, rows, weights, sums);
 }
 
 #if defined(__x86_64__)
 template <typename Sample>
 __attribute__((target("avx2"))) void sum_tile_avx2(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                                                   SumOf<Sample> (*sums)[tile_samples]) {
+                                                   SumOf<Sample> (*sums)[block_samples]) {
     sum_tile<Sample>(tile, rows, weights, sums);
 }
 #endif
@@ -97,13 +103,52 @@ void for_each_tile(size_t samples, int threads, const MakeWorker& make_worker) {
     std::atomic<size_t> next{0};
     const auto run = [&] {
         auto work = make_worker();
-        for (size_t begin; (begin = next.fetch_add(tile_samples)) < samples;)
-            work(begin, std::min(tile_samples, samples - begin));
+        for (size_t begin; (begin = next.fetch_add(block_samples)) < samples;)
+            work(begin, std::min(block_samples, samples - begin));
     };
     if (threads <= 0) threads = std::max(1, int(std::thread::hardware_concurrency()));
     std::vector<std::jthread> others;
     for (int t = 1; t < threads; ++t) others.emplace_back(run);
     run();
+}
+
+std::vector<float> sample_factors(const Basis& basis, size_t samples, const DemultiplexOptions& options) {
+    std::vector<float> factors(samples, float(basis.scale));
+    for (size_t p = 0; p < options.gain.size(); ++p) factors[p] = float(basis.scale * double(options.gain[p]));
+    return factors;
+}
+
+// A plan and its layout, made once for each basis of a known name; null where there is none.
+struct LaidOutPlan {
+    std::vector<int8_t> weights;  // of the basis that it was made for
+    HadamardPlan plan;
+    SumCode code;
+};
+
+std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
+    static std::mutex mutex;
+    static std::map<std::string, std::shared_ptr<const LaidOutPlan>> plans;
+    const std::lock_guard lock(mutex);
+    const auto known = plans.find(basis.name);
+    if (known != plans.end() && (!known->second || known->second->weights == basis.weights)) return known->second;
+    std::shared_ptr<const LaidOutPlan> made;
+    if (auto plan = hadamard_plan(basis)) {
+        SumCode code = lay_out(plan->plan, {plan->extra_row});
+        made = std::make_shared<LaidOutPlan>(LaidOutPlan{basis.weights, std::move(*plan), std::move(code)});
+    }
+    return plans[basis.name] = made;
+}
+
+void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const int32_t* const> rows,
+                         size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
+    const auto factors = sample_factors(basis, samples, options);
+    const HadamardJob job{&made.plan, &made.code, {}, rows, lamps, {}, factors};
+    for_each_tile(samples, options.threads, [&] {
+        return [&, scratch = std::make_unique<TileScratch>(made.code)](size_t begin, size_t count) {
+            TileCounts counts;
+            invert_tiles(job, begin, begin + count, *scratch, counts);
+        };
+    });
 }
 
 template <typename Sample>
@@ -114,19 +159,18 @@ void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows
     assert(options.gain.empty() || options.gain.size() == samples);
     const auto weights = grouped_weights<Sum>(basis);
     const auto kernel = best_sum_tile<Sample>();
+    const auto factors = sample_factors(basis, samples, options);
 
     const auto make_worker = [&] {
-        return [&, tile = std::vector<Sum>(rows.size() * tile_samples)](size_t begin, size_t count) mutable {
+        return [&, tile = std::vector<Sum>(rows.size() * block_samples)](size_t begin, size_t count) mutable {
             for (size_t r = 0; r < rows.size(); ++r)
-                std::copy_n(rows[r] + begin, count, tile.data() + r * tile_samples);
+                std::copy_n(rows[r] + begin, count, tile.data() + r * block_samples);
             for (int first = 0; first < basis.lamps; first += lamps_at_once) {
-                Sum sums[lamps_at_once][tile_samples];
+                Sum sums[lamps_at_once][block_samples];
                 kernel(tile.data(), basis.rows, weights.data() + size_t(first) * basis.rows, sums);
                 for (int k = 0; k < std::min(lamps_at_once, basis.lamps - first); ++k)
-                    for (size_t p = 0; p < count; ++p) {
-                        const double gain = options.gain.empty() ? 1.0 : options.gain[begin + p];
-                        lamps[first + k][begin + p] = float(double(sums[k][p]) * basis.scale * gain);
-                    }
+                    for (size_t p = 0; p < count; ++p)
+                        lamps[first + k][begin + p] = float(sums[k][p]) * factors[begin + p];
             }
         };
     };
@@ -137,7 +181,11 @@ void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows
 
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options) {
-    demultiplex_samples<int32_t>(basis, rows, samples, lamps, options);
+    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.lamps);
+    if (const auto made = plan_for(basis))
+        demultiplex_by_plan(*made, basis, rows, samples, lamps, options);
+    else
+        demultiplex_samples<int32_t>(basis, rows, samples, lamps, options);
 }
 
 void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,

@@ -19,7 +19,7 @@ struct DemultiplexOptions {
     int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
 };
 
-// lamps[i][p] = basis.scale * gain[p] * sum over rows of weight(row, i) * rows[row][p].
+// lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
 // `rows` holds basis.rows pointers and `lamps` basis.lamps pointers, each to `samples` values. The sum is exact in int32
 // when |counts| < 2^23: the weights of a lamp sum to at most 232 in magnitude (hadamard156, lamp 0), which suits every
 // camera of up to 16 bits.

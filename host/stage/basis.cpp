@@ -1,78 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Hadamard matrices by construction (Paley, Sylvester, Williamson), and the 0/1 lighting bases made from them.
-//
-// H is Hadamard of order n when its entries are +1 and -1 and H H' = n I. Light cannot be negative, so a basis lights
-// the lamps where H has one sign. Both inverses below are exact in small integers (Harwit and Sloane, "Hadamard
-// Transform Optics", 1979, sections 3.2 and 3.3).
+// The 0/1 lighting bases made from Hadamard matrices. Light cannot be negative, so a basis lights the lamps where H has
+// one sign. Both inverses below are exact in small integers (Harwit and Sloane, "Hadamard Transform Optics", 1979,
+// sections 3.2 and 3.3).
 #include "stage/basis.hpp"
 
-#include <string_view>
+#include "stage/hadamard.hpp"
 
 namespace ols {
 
 namespace {
-
-// A square matrix of +1 and -1.
-struct Signs {
-    int n = 0;
-    std::vector<int8_t> signs;
-
-    explicit Signs(int order) : n(order), signs(size_t(order) * order, 1) {}
-    int8_t& at(int row, int column) { return signs[size_t(row) * n + column]; }
-    int at(int row, int column) const { return signs[size_t(row) * n + column]; }
-};
-
-// Negates columns, then rows, until the first row and the first column are all +1; H H' = n I stays.
-void normalise(Signs& h) {
-    for (int c = 0; c < h.n; ++c)
-        if (h.at(0, c) < 0)
-            for (int r = 0; r < h.n; ++r) h.at(r, c) = int8_t(-h.at(r, c));
-    for (int r = 0; r < h.n; ++r)
-        if (h.at(r, 0) < 0)
-            for (int c = 0; c < h.n; ++c) h.at(r, c) = int8_t(-h.at(r, c));
-}
-
-// Paley's first construction, order q + 1 for a prime q = 3 mod 4: H = I + [0 1; -1 Q] with Q(i, j) = +1 when i - j is
-// a square modulo q, -1 when it is not, 0 on the diagonal (R. Paley, "On orthogonal matrices", 1933).
-Signs paley(int q) {
-    std::vector<bool> square(q, false);
-    for (int i = 1; i < q; ++i) square[size_t(i) * i % q] = true;
-    Signs h(q + 1);
-    for (int i = 0; i < q; ++i) {
-        h.at(i + 1, 0) = -1;
-        for (int j = 0; j < q; ++j) h.at(i + 1, j + 1) = i == j || square[(i - j + q) % q] ? 1 : -1;
-    }
-    normalise(h);
-    return h;
-}
-
-// [H H; H -H], of twice the order.
-Signs sylvester_double(const Signs& h) {
-    Signs doubled(2 * h.n);
-    for (int r = 0; r < doubled.n; ++r)
-        for (int c = 0; c < doubled.n; ++c)
-            doubled.at(r, c) = int8_t(h.at(r % h.n, c % h.n) * (r >= h.n && c >= h.n ? -1 : 1));
-    return doubled;
-}
-
-// Williamson's array [A B C D; -B A -D C; -C D A -B; -D -C B A] of four symmetric circulants of order 39, order 156.
-// A half-row holds elements 0..19 of a circulant's first row; symmetry gives the rest: a(k) = a(39 - k).
-Signs williamson_156() {
-    constexpr int order = 39;
-    constexpr std::string_view half_rows[4] = {"+-+-++-+--+--++-----", "+-+-++----+++--++---", "++---+-++++---+---+-",
-                                               "+-+++-++------+--+-+"};
-    constexpr int block[4][4] = {{0, 1, 2, 3}, {1, 0, 3, 2}, {2, 3, 0, 1}, {3, 2, 1, 0}};
-    constexpr int sign[4][4] = {{1, 1, 1, 1}, {-1, 1, -1, 1}, {-1, 1, 1, -1}, {-1, -1, 1, 1}};
-    Signs h(4 * order);
-    for (int r = 0; r < h.n; ++r)
-        for (int c = 0; c < h.n; ++c) {
-            const int k = (c % order - r % order + order) % order;
-            const char element = half_rows[block[r / order][c / order]][k < 20 ? k : order - k];
-            h.at(r, c) = int8_t(sign[r / order][c / order] * (element == '+' ? 1 : -1));
-        }
-    normalise(h);
-    return h;
-}
 
 Basis empty_basis(const std::string& name, int rows) {
     Basis basis;
@@ -114,7 +50,8 @@ Basis s159_basis() {
 // of row 0 (all lamps lit) for lamp 0 (lit in every row) is 1 - n/2 = -77: lamp 0 alone gains nothing from
 // multiplexing, its noise variance is (155 + 77^2) / 78^2 = 1.0 against 1/39 for the others.
 Basis hadamard156_basis() {
-    const Signs h = williamson_156();
+    Signs h = williamson_156();
+    normalise(h);
     Basis basis = empty_basis("hadamard156", h.n);
     for (int r = 0; r < basis.rows; ++r)
         for (int i = 0; i < basis.lamps; ++i) {

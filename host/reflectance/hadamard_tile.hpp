@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// Hadamard tile: plays a plan over a few dozen samples in short integers, proves that none of them wrapped, and falls
+// back to 32 bits where one did. SIMD by Highway, chosen at run time; every path gives the same bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "reflectance/hadamard_plan.hpp"
+
+namespace ols {
+
+constexpr size_t tile_samples =
+    64;  // one cache line pair of int16 a row; all of a plan's places fit the nearest caches
+
+struct HadamardJob {
+    const HadamardPlan* plan;
+    const SumCode* code;
+    // One of the two: a pointer a row.
+    std::span<const int16_t* const> rows16;
+    std::span<const int32_t* const> rows32;  // |counts| < 2^23
+    // One of the two: a pointer a lamp. Sums are z itself, those outside int16 refused; floats are z times factor.
+    std::span<float* const> lamps;
+    std::span<int32_t* const> sums;
+    std::span<const float> factors;  // a sample each
+};
+
+struct TileCounts {
+    uint64_t tiles = 0, fallbacks = 0;  // inverted; of these, in 32 bits
+};
+
+// Scratch of one thread.
+class TileScratch {
+  public:
+    explicit TileScratch(const SumCode& code);
+    ~TileScratch();
+    TileScratch(const TileScratch&) = delete;
+    TileScratch& operator=(const TileScratch&) = delete;
+
+    int16_t* short_places;
+    int32_t* long_places;
+};
+
+// Inverts samples begin..end-1.
+void invert_tiles(const HadamardJob& job, size_t begin, size_t end, TileScratch& scratch, TileCounts& counts);
+
+// Names of the SIMD paths that this processor has, best first; and the choice of one for what follows (tests, bench).
+// Nothing chosen: the best.
+std::vector<const char*> tile_paths();
+void choose_tile_path(const char* name);
+
+}  // namespace ols

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// The structured inversion of Hadamard bases: exact in integers on every SIMD path, for any counts, with short sums that
+// wrapped always noticed; and as few additions as it says.
+// links: ols_reflectance
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <random>
+
+#include "reflectance/hadamard_tile.hpp"
+
+using namespace ols;
+
+namespace {
+
+using Planes = std::vector<std::vector<int32_t>>;
+
+template <typename T>
+std::vector<T*> pointers(std::vector<std::vector<std::remove_const_t<T>>>& planes, size_t offset = 0) {
+    std::vector<T*> out;
+    for (auto& plane : planes) out.push_back(plane.data() + offset);
+    return out;
+}
+
+// The sums by their definition.
+Planes by_definition(const Basis& basis, const Planes& rows) {
+    const size_t samples = rows[0].size();
+    Planes sums(size_t(basis.lamps), std::vector<int32_t>(samples));
+    for (int lamp = 0; lamp < basis.lamps; ++lamp)
+        for (int row = 0; row < basis.rows; ++row) {
+            const int32_t weight = basis.weight(row, lamp);
+            for (size_t p = 0; p < samples; ++p) sums[size_t(lamp)][p] += weight * rows[size_t(row)][p];
+        }
+    return sums;
+}
+
+class HadamardInverse : public testing::TestWithParam<std::string> {
+  protected:
+    ~HadamardInverse() override { choose_tile_path(nullptr); }
+
+    // From rows of 16 bits where they fit, and from rows of 32 bits; both must agree.
+    Planes inverted(Planes rows) {
+        const size_t samples = rows[0].size();
+        Planes sums(size_t(basis.lamps), std::vector<int32_t>(samples));
+        TileScratch scratch(code);
+        counts = {};
+        const auto rows32 = pointers<const int32_t>(rows);
+        const auto out = pointers<int32_t>(sums);
+        invert_tiles({&plan, &code, {}, rows32, {}, out, {}}, 0, samples, scratch, counts);
+        std::vector<std::vector<int16_t>> short_rows;
+        for (const auto& row : rows) {
+            short_rows.emplace_back(row.begin(), row.end());
+            if (!std::equal(row.begin(), row.end(), short_rows.back().begin())) return sums;
+        }
+        Planes again = sums;
+        const auto rows16 = pointers<const int16_t>(short_rows);
+        const auto out_again = pointers<int32_t>(again);
+        invert_tiles({&plan, &code, rows16, {}, {}, out_again, {}}, 0, samples, scratch, counts);
+        EXPECT_EQ(sums, again);
+        return sums;
+    }
+
+    Planes random_rows(size_t samples, int lowest, int highest, unsigned seed = 1) const {
+        std::mt19937 random(seed);
+        std::uniform_int_distribution<int> count(lowest, highest);
+        Planes rows(size_t(basis.rows), std::vector<int32_t>(samples));
+        for (auto& row : rows)
+            for (auto& v : row) v = count(random);
+        return rows;
+    }
+
+    // Rows of which lamp `lamp` gets the sum `wanted` and every other lamp a small one: its own weights, scaled.
+    Planes rows_for(int lamp, int wanted) const {
+        Planes rows(size_t(basis.rows), std::vector<int32_t>(1));
+        int sum = 0, ones = 0;
+        for (int row = 0; row < basis.rows; ++row) ones += std::abs(basis.weight(row, lamp)) == 1;
+        for (int row = 0; row < basis.rows; ++row) {
+            const int weight = basis.weight(row, lamp);
+            if (std::abs(weight) != 1) continue;
+            rows[size_t(row)][0] = weight * (wanted / ones);
+            sum += wanted / ones;
+        }
+        for (int row = 0; sum != wanted; ++row)
+            if (std::abs(basis.weight(row, lamp)) == 1)
+                rows[size_t(row)][0] += basis.weight(row, lamp) * (wanted > sum ? 1 : -1), sum += wanted > sum ? 1 : -1;
+        return rows;
+    }
+
+    const Basis basis = *find_basis(GetParam());
+    const HadamardPlan plan = *hadamard_plan(basis);
+    const SumCode code = lay_out(plan.plan, {plan.extra_row});
+    TileCounts counts;
+};
+INSTANTIATE_TEST_SUITE_P(, HadamardInverse, testing::Values("s159", "hadamard156"));
+
+// SAMPLES=10000000 for the long run.
+TEST_P(HadamardInverse, sums_equal_exact_arithmetic_on_every_path) {
+    const char* wanted = std::getenv("SAMPLES");
+    const size_t samples = wanted ? std::strtoull(wanted, nullptr, 10) : 20'000;
+    constexpr size_t at_once = 4001;  // no multiple of a tile
+    // Camera counts, as bright as 16 bits get, and about where short sums begin to wrap.
+    constexpr int ranges[][2] = {{-40, 4095}, {-32768, 32767}, {-2600, 2600}, {-9, 9}};
+    for (size_t done = 0; done < samples; done += at_once) {
+        const auto& range = ranges[done / at_once % 4];
+        const Planes rows = random_rows(at_once, range[0], range[1], unsigned(done));
+        const Planes truth = by_definition(basis, rows);
+        for (const char* path : tile_paths()) {
+            choose_tile_path(path);
+            ASSERT_EQ(inverted(rows), truth) << path << ", counts to " << range[1];
+        }
+    }
+}
+
+TEST_P(HadamardInverse, counts_beyond_16_bits_are_exact_too) {
+    for (const char* path : tile_paths()) {
+        choose_tile_path(path);
+        const Planes rows = random_rows(130, -(1 << 23) + 1, (1 << 23) - 1);
+        EXPECT_EQ(inverted(rows), by_definition(basis, rows)) << path;
+        EXPECT_EQ(counts.fallbacks, counts.tiles) << path;
+    }
+}
+
+// One sum at each corner of 16 bits, of every lamp. 65536 is the hardest: it wraps to zero, and its square is 2^32, which
+// an identity modulo 2^32 alone would not miss.
+TEST_P(HadamardInverse, a_single_wrapped_sum_is_always_noticed) {
+    for (const char* path : tile_paths()) {
+        choose_tile_path(path);
+        for (const int wanted : {32767, -32767, 32768, -32768, 32769, -32769, 65535, 65536, -65536, 131072})
+            for (int lamp = 0; lamp < basis.lamps; lamp += 7) {
+                const Planes rows = rows_for(lamp, wanted), truth = by_definition(basis, rows);
+                ASSERT_EQ(truth[size_t(lamp)][0], wanted);
+                ASSERT_EQ(inverted(rows), truth) << path << " lamp " << lamp << " sum " << wanted;
+                const bool sum_of_all = plan.lamp_output[size_t(lamp)] < 0;
+                const bool fits = std::abs(wanted) < 32768 || sum_of_all;  // which is kept in 32 bits
+                ASSERT_EQ(counts.fallbacks, fits ? 0u : counts.tiles) << path << " lamp " << lamp << " sum " << wanted;
+            }
+    }
+}
+
+TEST_P(HadamardInverse, ordinary_counts_need_no_fallback) {
+    std::mt19937 random(5);
+    Planes lamps(size_t(basis.lamps), std::vector<int32_t>(640)), rows(size_t(basis.rows), lamps[0]);
+    for (auto& lamp : lamps)
+        for (auto& v : lamp) v = int(random() % 40);  // up to 4095 counts with half of the lamps lit
+    for (int row = 0; row < basis.rows; ++row) {
+        std::fill(rows[size_t(row)].begin(), rows[size_t(row)].end(), 0);
+        for (int lamp = 0; lamp < basis.lamps; ++lamp)
+            for (size_t p = 0; p < 640 && basis.lit(row, lamp); ++p) rows[size_t(row)][p] += lamps[size_t(lamp)][p];
+    }
+    const Planes sums = inverted(rows);
+    EXPECT_EQ(counts.fallbacks, 0u);
+    const int one = int(std::lround(1 / basis.scale));
+    for (int lamp = 0; lamp < basis.lamps; ++lamp)
+        for (size_t p = 0; p < 640; ++p) ASSERT_EQ(sums[size_t(lamp)][p], one * lamps[size_t(lamp)][p]);
+}
+
+// A plain sum takes rows - 1 additions a lamp: 24 648 and 24 180.
+TEST(HadamardPlan, takes_a_ninth_and_less_of_the_additions) {
+    EXPECT_LE(hadamard_plan(*find_basis("s159"))->plan.additions(), 2718);
+    EXPECT_LE(hadamard_plan(*find_basis("hadamard156"))->plan.additions(), 3615);
+}
+
+TEST(HadamardPlan, a_basis_that_only_bears_the_name_has_none) {
+    Basis basis = *find_basis("s159");
+    basis.weights[1000] = int8_t(-basis.weights[1000]);
+    EXPECT_FALSE(hadamard_plan(basis));
+    EXPECT_FALSE(hadamard_plan(*find_basis("single")));
+}
+
+TEST(SumPlan, shared_pairs_change_nothing_but_the_number_of_additions) {
+    std::mt19937 random(2);
+    std::vector<Terms> rows(40);
+    std::vector<std::vector<int>> matrix(40, std::vector<int>(30));
+    for (size_t r = 0; r < rows.size(); ++r)
+        for (int n = 0; n < 30; ++n) {
+            matrix[r][size_t(n)] = int(random() % 3) - 1;
+            if (matrix[r][size_t(n)]) rows[r].push_back({n, matrix[r][size_t(n)]});
+        }
+    int before = 0;
+    for (const int uses_min : {1000, 4, 2}) {
+        SumPlan plan(30);
+        for (const int value : plan.sums(rows, uses_min)) plan.add_output(value);
+        EXPECT_EQ(plan.matrix(), matrix);
+        if (before) {
+            EXPECT_LT(plan.additions(), before);
+        }
+        before = plan.additions();
+    }
+}
+
+}  // namespace
