@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit hil fuzz-smoke fuzz lint lint-fast \
+.PHONY: all help setup firmware host checked assets demo test unit hil fuzz-smoke fuzz mutation lint lint-fast \
         format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -49,6 +49,9 @@ fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fu
 
 fuzz: setup ## ten minutes of every fuzzer; SECONDS_EACH=n for another budget
 	@tests/fuzz/run.sh $(or $(SECONDS_EACH),600)
+
+mutation: setup ## changes sequence.c, frame.c and fault.c in one place at a time: do the unit tests notice? (half an hour)
+	@python3 tests/mutation/mutate.py
 
 lint: host ## formatting, licence tags, file lengths, include directions, clang-tidy
 	@python3 tools/lint/lint.py --tidy
