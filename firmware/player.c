@@ -144,6 +144,8 @@ static void count_cycles(void) {
     begun += timeline_new > shifter_new ? timeline_new : shifter_new;
 }
 
+// From what DMA has copied less what the FIFO still holds, read until nothing was copied in between; each read takes longer
+// than DMA does from a word's read to its write.
 uint32_t player_cycles_begun(void) {
     const uint32_t cycle_words = playing->cycle_words + 1;  // with the wait for the next cycle's edge
     uint32_t fed, next_word, queued;

@@ -103,21 +103,22 @@ static void take_next(void) {
     next = OLS_NEXT_NONE;
 }
 
-// Each edge begins a cycle, or came while one played and is missed.
+// Each edge begins a cycle, or came while one played and is missed. Reading takes longer than a cycle takes to begin after
+// its edge, so with as many cycles before as after, all of them are of the edges read in between.
 static void count_edges(void) {
     if (started_by != OLS_START_EACH_CYCLE_BY_EDGE) return;
     uint32_t cycles;
     do {
         cycles = player_cycles_begun();
         edges_seen = receptor_edges();
-    } while (cycles != player_cycles_begun());  // once a cycle: they were of different moments
+    } while (cycles != player_cycles_begun());
     edges_missed = edges_seen - cycles;
 }
 
-// While the player still knows its cycles.
+// While it and the player still know what they counted.
 static void stop_receptor(void) {
-    receptor_stop();
     if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+    receptor_stop();
 }
 
 void stage_init(void) {

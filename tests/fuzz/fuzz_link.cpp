@@ -137,6 +137,8 @@ void arm_from(Script& script) {
     const uint8_t how = script.byte();
     if (how & 1) arm.heartbeat_ticks = OLS_HEARTBEAT_TICKS_MIN + 1000u * script.byte();
     if (how & 2) arm.start_source = OLS_START_BY_EDGE;
+    if (how & 4) arm.start_source = OLS_START_EACH_CYCLE_BY_EDGE;
+    if (how & 12) arm.debounce_ticks = how / 16 * 2u;
     command(OLS_ARM, bytes_of(arm));
 }
 
@@ -181,6 +183,12 @@ void play(Script& script) {
     if (command(OLS_START) && script.byte() % 2) board_host_genlock();
 }
 
+void pass_time(Script& script) {
+    const uint8_t how = script.byte();
+    if (how % 4 == 0) board_host_genlock();
+    board_host_run_us(1u + 64u * how);
+}
+
 void step(Script& script) {
     switch (script.byte() % 12) {
         case 0:
@@ -194,7 +202,7 @@ void step(Script& script) {
         case 8: return noise(script);
         case 9: return trouble(script);
         case 10: command(OLS_READ_TRIGGER_LOG, bytes_of(ols_read_trigger_log{script.byte(), script.byte(), 0})); return;
-        default: return board_host_run_us(1u + 64u * script.byte());
+        default: return pass_time(script);
     }
 }
 
@@ -202,6 +210,7 @@ void check_state(uint8_t state_before) {
     const ols_status_reply now = status();
     expect(is_lit(now) == board_host_pins_are_connected());
     expect((now.state == OLS_STATE_FAULT) == (now.fault != OLS_FAULT_NONE));
+    expect(now.edges_missed <= now.edges_seen);
     if (state_before == OLS_STATE_FAULT && now.state == OLS_STATE_FAULT) expect(!command(OLS_START));
 }
 

@@ -263,6 +263,25 @@ TEST_F(Link, each_cycle_waits_for_an_edge_and_edges_during_play_are_counted_as_m
     EXPECT_EQ(status().edges_seen, 0u);
 }
 
+TEST_F(Link, a_cycle_may_wait_for_its_edge_longer_than_stamps_and_half_of_them_count) {
+    ASSERT_TRUE(load(program(18), 3).ok(OLS_LOAD_END));
+    ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_EACH_CYCLE_BY_EDGE, {}, 1250})).ok(OLS_ARM));
+    ASSERT_TRUE(ask(OLS_START).ok(OLS_START));
+    for (const uint64_t wait_us : {100'000'000, 40'000'000, 80'000'000}) {  // stamps count for 68.7 s
+        board_host_run_us(wait_us);
+        board_host_genlock();
+        board_host_run_us(10'000);
+        EXPECT_EQ(status().fault, OLS_FAULT_NONE) << wait_us;
+    }
+    EXPECT_EQ(status().state, OLS_STATE_DONE);
+    const auto reply = ask(OLS_READ_TRIGGER_LOG, bytes_of(ols_read_trigger_log{35, 2, 0}));
+    ols_trigger_log_entry entries[2];
+    std::memcpy(entries, reply.payload.data() + sizeof(ols_trigger_log_reply), sizeof entries);
+    const uint64_t apart_us = (entries[1].rise_ticks - entries[0].rise_ticks) / 125;
+    EXPECT_NEAR(double(apart_us), 80e6 + 10'000 - 17 * 57'870 / 125, 2'000.);
+    EXPECT_EQ(entries[1].cycle, 2u);
+}
+
 TEST_F(Link, cycles_that_wait_for_edges_are_not_swapped) {
     ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
     ASSERT_TRUE(ask(OLS_ARM, bytes_of(ols_arm{0, OLS_START_EACH_CYCLE_BY_EDGE, {}, 4})).ok(OLS_ARM));

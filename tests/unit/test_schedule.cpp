@@ -137,6 +137,27 @@ TEST(Schedule, notices_the_very_trigger_that_is_off_by_more_than_the_tolerance_a
     }
 }
 
+TEST(Schedule, begins_anew_with_each_cycle_that_waits_but_holds_within_it) {
+    std::mt19937 pick(4);
+    for (int round = 0; round < 200; round++) {
+        const Slots slots = random_slots(pick, 2 + int(pick() % 20), 1);
+        const auto played = sequence_of(slots, 0, 0, 0);
+        schedule_begin(played.get(), true);
+        int64_t begin_ticks = 0;
+        for (int cycle = 0; cycle < 4; cycle++) {
+            std::vector<int64_t> rises;
+            add_rises(*played, slots, 1, begin_ticks, rises);
+            for (size_t n = 0; n < rises.size(); n++) {
+                const bool slips = cycle == 3 && n + 1 == rises.size();
+                ASSERT_EQ(take(rises[n] + (slips ? 6 : 0)), !slips) << "round " << round << ", cycle " << cycle;
+                ASSERT_EQ(schedule_ticks_to_next(), n + 1 < rises.size() ? uint32_t(rises[n + 1] - rises[n]) : 0u)
+                    << "nothing is due while an edge is waited for";
+            }
+            begin_ticks += pick() % 2 ? int64_t(pick() % 100'000) : int64_t(pick()) * 3;  // more than 32 bits of ticks
+        }
+    }
+}
+
 TEST(Schedule, notices_a_trigger_that_has_been_left_out) {
     const Slots slots = {{OLS_BASIS, 1, 0, 0, 200, 5'000, 0}, {OLS_BASIS, 1, 0, 0, 200, 6'000, 0}};
     const auto played = sequence_of(slots, 0, 0, 0);

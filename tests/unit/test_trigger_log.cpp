@@ -10,6 +10,8 @@
 #include <memory>
 #include <vector>
 
+#include "cycle_digest.h"
+
 namespace {
 
 constexpr uint64_t first_rise = 20;  // ticks after start
@@ -95,9 +97,18 @@ TEST(TriggerLog, cycles_that_wait_may_begin_at_any_time_but_not_slip_within) {
     const auto played = sequence_of_four();
     trigger_log_begin(played.get(), true);
     const uint64_t begins[] = {20, 300'000, 123'456'790};
-    for (const uint64_t begin : begins)
+    ols_digests_reply digests;
+    ols_cycle_digest digest;
+    for (uint32_t n = 0; n < 3; n++) {
+        const uint64_t begin = begins[n];
         for (const uint64_t rise : {0, 50'000, 180'000})
             EXPECT_TRUE(trigger_log_add(stamp_at(begin + rise), begin + rise + 100)) << begin << " " << rise;
+        cycle_digest_read(n, 1, &digests, &digest);
+        ASSERT_EQ(digests.digest_count, 1) << "made with the cycle's last trigger, whenever the next one may come";
+        EXPECT_EQ(digest.cycle, n);
+        EXPECT_EQ(digest.trigger_count, 3);
+        EXPECT_EQ(digest.flags, 0);
+    }
     const uint64_t late = 200'000'000;
     EXPECT_TRUE(trigger_log_add(stamp_at(late), late));
     EXPECT_FALSE(trigger_log_add(stamp_at(late + 50'004), late + 50'100));
