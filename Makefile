@@ -41,7 +41,7 @@ unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@$(PYTHON) -m pytest -q tests/unit tests/oracle
 	@cd tools/stagesim/board && npm test --silent
 
-hil: all ## the numbered board tests and the capture tests, on the emulated board (BOARD=emulated)
+hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
 
 fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fuzzer

@@ -9,6 +9,9 @@ import pytest
 from ols_board import wire
 from ols_board.board import ROOT, BoardError
 
+sys.path.insert(0, str(ROOT / "firmware/tools"))
+import shift_rates  # noqa: E402
+
 HASH_TOOL = ROOT / "protocol/layout_hash.py"
 WIRE_H = ROOT / "protocol/wire.h"
 
@@ -22,7 +25,19 @@ def test_hello_tells_layout_chain_and_clock(emulated):
     hello = emulated().plug().hello(layout_hash(WIRE_H))
     assert hello["layout_hash"] == layout_hash(WIRE_H)
     assert (hello["chain_bits"], hello["slots_max"], hello["tick_hz"]) == (176, 1024, 125_000_000)
-    assert hello["board_id"] == b"OLS-VIRT"
+
+
+def test_the_board_id_is_the_flash_chips_unique_number(emulated):
+    hello = emulated("--board-id", "0123456789abcdef").plug().hello(0)
+    assert hello["board_id"].hex() == "0123456789abcdef"
+
+
+def test_the_manuals_shift_rates_are_what_the_board_reckons_with(emulated):
+    hello = emulated().plug().hello(0)
+    assert hello["shift_ticks"] == shift_rates.shift_ticks(hello["chain_bits"], 1)
+    assert hello["slot_gap_ticks"] == shift_rates.GAP_TICKS
+    manual = (ROOT / "docs/hardware.md").read_text()
+    assert manual == shift_rates.with_table(manual, 176), "run: firmware/tools/shift_rates.py --write docs/hardware.md"
 
 
 @pytest.mark.parametrize("name", ("pico", "feather_can"))

@@ -150,3 +150,15 @@ def test_an_image_connected_as_another_board_reaches_no_lamp(emulated):
         link.play(paper_program(cycles=1, slots=18))
     board.stop()
     assert not any(level for _, name, level in check_trace.read_vcd(board.trace) if name in ("LATCH", "LIGHT_EN"))
+
+
+def test_latch_is_never_high_while_the_clock_rises_so_the_drivers_stay_in_their_normal_mode(emulated):
+    board = emulated(trace=True)
+    play_to_the_end(board, paper_program(cycles=2, slots=18))
+    board.stop()
+    high, rises, together = set(), 0, 0
+    for _, name, level in check_trace.read_vcd(board.trace):
+        (high.add if level else high.discard)(name)
+        rises += name == "CLK" and level
+        together += name == "CLK" and level and "LATCH" in high
+    assert rises >= 36 * 176 and together == 0

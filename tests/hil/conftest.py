@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: MIT
-# Chooses the board that the tests run against: BOARD=emulated (the default), can:emulated, can:IFACE.
+# Chooses the board that the tests run against: BOARD=emulated (the default), can:emulated (its CAN bus), usb:SERIAL (or
+# usb:, the only one), can:IFACE.
 import shutil
 
 import pytest
 
 from ols_board import board
 
-
+KIND = board.BOARD
 EMULATED = ("emulated", "can:emulated")
 
 
 def pytest_configure():
-    if board.BOARD not in EMULATED and not board.BOARD.startswith("can:"):
-        raise pytest.UsageError(f"BOARD={board.BOARD}: write emulated, can:emulated or can:IFACE")
+    if KIND not in EMULATED and not KIND.startswith(("usb:", "can:")):
+        raise pytest.UsageError(f"BOARD={KIND}: write emulated, can:emulated, usb:, usb:SERIAL or can:IFACE")
+    if KIND not in EMULATED:
+        return
     if not board.IMAGE.exists():
         raise pytest.UsageError(f"{board.IMAGE}: no firmware image; build it with `make firmware`")
     if not (board.EMULATOR.parent / "node_modules").exists():
@@ -21,18 +24,24 @@ def pytest_configure():
         raise pytest.UsageError("sigrok-cli is missing: apt-get install sigrok-cli")
 
 
+def real_board(arguments, options):
+    if arguments or options:
+        pytest.skip("needs the emulated board: a real one has no injected faults and no trace")
+    if KIND.startswith("can:"):
+        return board.CanBoard(KIND.removeprefix("can:"))
+    from ols_board.usb_board import UsbBoard  # only here: PyUSB wants libusb
+    return UsbBoard(KIND.removeprefix("usb:"))
+
+
 @pytest.fixture
 def emulated():
-    """Starts emulated boards, and ends whatever a test leaves running."""
+    """Starts emulated boards, and ends whatever a test leaves running; with BOARD=usb:SERIAL or can:IFACE, the real board."""
     started = []
 
     def start(*arguments, **options):
-        if board.BOARD not in EMULATED:
-            if arguments or options:
-                pytest.skip("a real board has no injections and no traces")
-            return board.RealBoard()
-        started.append(board.EmulatedBoard(*arguments, **options))
-        return started[-1]
+        made = board.EmulatedBoard(*arguments, **options) if KIND in EMULATED else real_board(arguments, options)
+        started.append(made)
+        return made
 
     yield start
     for one in started:

@@ -102,11 +102,19 @@ class EmulatedBoard:
         self.directory.cleanup()
 
 
-class RealBoard:
-    """A board at a CAN interface of this machine, BOARD=can:IFACE."""
+class CanBoard:
+    """A real board at a CAN interface of this machine."""
 
-    def plug(self):
-        return Link(Can(SocketCanBus(BOARD.removeprefix("can:"))))
+    def __init__(self, interface):
+        self.interface = interface
+
+    def bus(self):
+        return SocketCanBus(self.interface)
+
+    def plug_can(self):
+        return Link(Can(self.bus()))
+
+    plug = plug_can
 
     def __exit__(self, *_):
         pass

@@ -213,7 +213,7 @@ export class UsbHost {
     if (request.type === 'control') {
       entry.transfer = new ControlTransfer(request.setup, request.data);
       entry.transfer.packetBytes = this.#packetBytes.get(0);
-      this.#noteHaltCleared(request.setup);
+      this.#noteToggleRestart(request.setup);
     } else {
       const packetBytes = this.#packetBytes.get(request.endpoint);
       if (packetBytes === undefined) {
@@ -236,9 +236,10 @@ export class UsbHost {
     return this.#toggles.get(endpoint);
   }
 
-  /** Clearing an endpoint's halt starts its data toggle again (USB 2.0 9.4.5). */
-  #noteHaltCleared(setup) {
+  /** Clearing an endpoint's halt starts its data toggle again, a configuration those of all (USB 2.0 9.4.5, 9.1.1.5). */
+  #noteToggleRestart(setup) {
     if (setup[0] === 0x02 && setup[1] === CLEAR_FEATURE) this.#toggle(setup[4]).data1 = false;
+    if (setup[0] === 0x00 && setup[1] === SET_CONFIGURATION) this.#toggles.clear();
   }
 
   /** Puts the next transaction on the bus, pipe after pipe, skipping those that would only be NAKed. */
