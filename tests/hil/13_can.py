@@ -122,6 +122,18 @@ def test_the_digest_of_every_cycle_is_what_its_entries_give(board):
         assert struct.unpack("<II", crc[1]) == (digest["cycle"], digest["entries_crc32"])
 
 
+def test_at_twenty_thousand_triggers_a_second_every_digest_is_complete(board):
+    link = board.plug()
+    program = paper_program(cycles=10, slots=180)
+    for slot in program["slots"]:
+        slot.update(exposure_ticks=3000, period_ticks=6250)
+    link.play(program)
+    assert link.wait_until([wire.DONE, wire.FAULT])["fault"] == 0
+    digests, lost = link.digests()
+    assert lost == 0 and [(one["cycle"], one["trigger_count"], one["flags"]) for one in digests] == [
+        (cycle, 180, 0) for cycle in range(10)]
+
+
 def test_a_stop_marks_the_cycle_that_it_cuts_short(board):
     link = board.plug_can()
     link.play(paper_program(cycles=0, slots=18))
