@@ -6,18 +6,23 @@
 
 #include "frame.h"
 
-enum { DIGESTS = 32 };
+enum { DIGESTS = 32, ENTRIES_A_TURN_MAX = 64 };
 
 static struct ols_cycle_digest digests[DIGESTS];
 static uint32_t oldest, made, read_to, lost;  // as in the trigger log
 static uint32_t told;
 static struct ols_cycle_digest under_way;  // without entries while its trigger_count is 0
+static bool too_many;                      // entries in this turn
 static bool gap;                           // entries before the next one are missing
 
 void cycle_digest_begin(void) {
     oldest = made = read_to = lost = told = 0;
     under_way.trigger_count = 0;
     gap = false;
+}
+
+void cycle_digest_begin_turn(uint32_t entries) {
+    too_many = entries > ENTRIES_A_TURN_MAX;
 }
 
 static void complete(uint8_t flags) {
@@ -29,6 +34,7 @@ static void complete(uint8_t flags) {
 }
 
 void cycle_digest_add(const struct ols_trigger_log_entry* entry) {
+    if (too_many) return cycle_digest_skip();
     if (under_way.cycle != entry->cycle || under_way.program != entry->program) complete(0);
     if (under_way.trigger_count == 0)
         under_way = (struct ols_cycle_digest){.first_rise_ticks = entry->rise_ticks,

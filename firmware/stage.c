@@ -132,6 +132,7 @@ void stage_init(void) {
 // Reads the witness's stamps into the log. False when a trigger was not where it should be.
 static bool read_witness(void) {
     const uint32_t seen = witness_count();
+    cycle_digest_begin_turn(seen - stamps_read);
     if (seen - stamps_read > WITNESS_RING_STAMPS) {
         trigger_log_skip(seen - stamps_read - WITNESS_RING_STAMPS);
         stamps_read = seen - WITNESS_RING_STAMPS;

@@ -249,7 +249,8 @@ struct ols_digests_reply {
 } OLS_PACKED;
 
 enum ols_digest_flags {
-    OLS_DIGEST_INCOMPLETE = 1  // the cycle fired triggers that the log lost, or play ended in it
+    OLS_DIGEST_INCOMPLETE =
+        1  // not of all the cycle's triggers: some were lost or too many at once, or play ended in it
 };
 
 // What the trigger log says of one cycle. A host that has all its entries can tell: it makes the same of them.

@@ -28,6 +28,7 @@ uint32_t crc_of(uint32_t first, uint32_t count, uint32_t cycle, uint8_t program 
 void add(uint32_t first, uint32_t count, uint32_t cycle, uint8_t program = 0) {
     for (uint32_t n = first; n < first + count; n++) {
         const ols_trigger_log_entry one = entry(n, cycle, program);
+        cycle_digest_begin_turn(1);
         cycle_digest_add(&one);
     }
 }
@@ -91,6 +92,26 @@ TEST(CycleDigest, LostTriggersAndAStopMarkTheCyclesTheyTouch) {
     }
     EXPECT_EQ(cycles, (std::vector<uint32_t>{0, 1, 3, 4, 5}));
     EXPECT_EQ(flags, (std::vector<int>{0, OLS_DIGEST_INCOMPLETE, OLS_DIGEST_INCOMPLETE, 0, OLS_DIGEST_INCOMPLETE}));
+}
+
+TEST(CycleDigest, MoreThanATurnHasTimeForIsLeftOutAndSaid) {
+    cycle_digest_begin();
+    add(0, 50, 0);
+    cycle_digest_begin_turn(65);
+    for (uint32_t n = 50; n < 115; n++) {
+        const ols_trigger_log_entry one = entry(n, n / 60);
+        cycle_digest_add(&one);
+    }
+    add(115, 5, 1);
+    add(120, 5, 2);
+    cycle_digest_end(true);
+    const Reading all = read(0);
+    ASSERT_EQ(all.digests.size(), 3u);
+    EXPECT_EQ(uint16_t(all.digests[0].trigger_count), 50);
+    EXPECT_EQ(uint16_t(all.digests[1].trigger_count), 5);
+    EXPECT_EQ(all.digests[0].flags, OLS_DIGEST_INCOMPLETE);
+    EXPECT_EQ(all.digests[1].flags, OLS_DIGEST_INCOMPLETE);
+    EXPECT_EQ(all.digests[2].flags, 0);
 }
 
 TEST(CycleDigest, OverwrittenOnesAreCountedUnlessTheyWereRead) {

@@ -3,6 +3,7 @@
 import select
 import socket
 import struct
+import time
 
 import isotp
 
@@ -69,7 +70,6 @@ class SocketCanBus:
 
     @property
     def tick(self):
-        import time
         return time.monotonic_ns() // 8
 
     def close(self):
@@ -77,6 +77,10 @@ class SocketCanBus:
 
     def send(self, frame_id, data):
         self.socket.send(struct.pack("<IB3x8s", frame_id, len(data), bytes(data)))
+
+    def send_all(self, frame_id, datas):
+        for data in datas:
+            self.send(frame_id, data)
 
     def receive(self, wait=True):
         if not select.select([self.socket], [], [], 0.01 if wait else 0)[0]:
