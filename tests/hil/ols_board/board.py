@@ -108,8 +108,14 @@ class CanBoard:
     def __init__(self, interface):
         self.interface = interface
 
-    def plug(self):
-        return Link(Can(SocketCanBus(self.interface)))
+    def bus(self):
+        """One more node on the board's CAN bus."""
+        return SocketCanBus(self.interface)
+
+    def plug_can(self):
+        return Link(Can(self.bus()))
+
+    plug = plug_can
 
     def __exit__(self, *_):
         pass
