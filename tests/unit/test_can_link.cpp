@@ -60,7 +60,7 @@ class CanLink : public Link {
 
     void play_from_can(uint32_t heartbeat_ticks = 0) {
         ASSERT_TRUE(load(program(18), 0).ok(OLS_LOAD_END));
-        ASSERT_TRUE(ask_can(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks, 0, {}, 0})).ok(OLS_ARM));
+        ASSERT_TRUE(ask_can(OLS_ARM, bytes_of(ols_arm{heartbeat_ticks, OLS_START_BY_COMMAND, {}, 0})).ok(OLS_ARM));
         ASSERT_TRUE(ask_can(OLS_START).ok(OLS_START));
     }
 

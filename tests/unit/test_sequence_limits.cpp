@@ -225,7 +225,9 @@ TEST(SequenceLimits, latch_is_as_long_in_dark_slots_as_in_others) {
         while (!stage.ended()) {
             stage.tick();
             const bool latch = stage.block.pins >> LATCH & 1;
-            if (!latch && high > 0) ASSERT_EQ(high, SLOT_LATCH_TICKS);
+            if (!latch && high > 0) {
+                ASSERT_EQ(high, SLOT_LATCH_TICKS);
+            }
             high = latch ? high + 1 : 0;
         }
     }
