@@ -238,7 +238,8 @@ Result<ols_status_reply> Board::status() {
     return ask<ols_status_reply>(OLS_STATUS);
 }
 
-// Appends the entries of a reply. False when its length is wrong.
+// Appends the entries of a reply that are new: when what was asked for is gone, the replies to several requests begin alike.
+// False when its length is wrong.
 static bool append_entries(std::span<const uint8_t> reply, TriggerLog& log) {
     ols_trigger_log_reply head;
     if (reply.size() < sizeof head) return false;
@@ -246,11 +247,11 @@ static bool append_entries(std::span<const uint8_t> reply, TriggerLog& log) {
     if (reply.size() != sizeof head + head.entry_count * sizeof(ols_trigger_log_entry)) return false;
     log.next_counter = head.next_counter;
     log.entries_lost = head.entries_lost;
-    const size_t before = log.entries.size();
-    log.entries.resize(before + head.entry_count);
-    if (head.entry_count)
-        std::memcpy(log.entries.data() + before, reply.data() + sizeof head,
-                    head.entry_count * sizeof(ols_trigger_log_entry));
+    for (size_t n = 0; n < head.entry_count; ++n) {
+        ols_trigger_log_entry entry;
+        std::memcpy(&entry, reply.data() + sizeof head + n * sizeof entry, sizeof entry);
+        if (log.entries.empty() || entry.counter > log.entries.back().counter) log.entries.push_back(entry);
+    }
     return true;
 }
 

@@ -261,7 +261,7 @@ def test_damaged_and_replayed_frames_in_play_change_nothing_that_is_played(emula
     program = paper_program(cycles=0, slots=18)
     link.play(program)
     replayed = [wire.frame(wire.STATUS, 7), wire.frame(wire.START, 8), wire.frame(wire.LOAD_END, 9),
-                wire.frame(wire.ARM, 10, wire.ARM_REQUEST.pack(0, 0)), wire.frame(wire.CLEAR_FAULT, 11),
+                wire.frame(wire.ARM, 10, wire.ARM_REQUEST.pack(0, 0, 0)), wire.frame(wire.CLEAR_FAULT, 11),
                 wire.frame(wire.LOAD_CHUNK, 12, bytes(4) + wire.program_bytes(program)[:200])]
     for _ in range(40):
         frame = pick.choice(replayed)

@@ -210,6 +210,26 @@ TEST(Board, a_log_that_is_far_behind_is_asked_for_by_four_messages_in_one_write)
     EXPECT_EQ(asked.size(), 21u);  // 20 full messages and the rest
 }
 
+TEST(Board, entries_that_several_replies_repeat_because_what_was_asked_for_is_gone_come_once) {
+    uint32_t oldest = 500;  // moves on between the messages
+    auto board = connect([&](uint16_t, const Bytes& payload) {
+        ols_read_trigger_log what;
+        std::memcpy(&what, payload.data(), sizeof what);
+        const uint32_t first = std::max(uint32_t(what.first_counter), oldest);
+        oldest += 5;
+        Bytes reply = bytes_of(ols_trigger_log_reply{first, 1524, 400, what.entries_max, 0});
+        for (uint32_t i = 0; i < what.entries_max; ++i) {
+            const Bytes entry = bytes_of(ols_trigger_log_entry{0, first + i, 0, 0, 1, 0});
+            reply.insert(reply.end(), entry.begin(), entry.end());
+        }
+        return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};
+    });
+    const auto log = board->read_trigger_log(100, 400);
+    ASSERT_TRUE(log.ok()) << log.error().message;
+    ASSERT_EQ(log->entries.size(), 48u + 3 * 5);
+    for (size_t n = 0; n < log->entries.size(); ++n) EXPECT_EQ(uint32_t(log->entries[n].counter), 500 + n);
+}
+
 TEST(Board, a_trigger_log_whose_length_lies_is_an_error) {
     auto board = connect([](uint16_t, const Bytes&) {
         return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, bytes_of(ols_trigger_log_reply{0, 9, 0, 9, 0})};

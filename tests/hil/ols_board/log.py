@@ -35,12 +35,13 @@ class TriggerStream:
         first, self.next_counter, self.lost, count, _ = wire.LOG_REPLY.unpack_from(reply)
         new = [wire.LOG_ENTRY.unpack_from(reply, wire.LOG_REPLY.size + n * wire.LOG_ENTRY.size) for n in range(count)]
         assert [entry[1] for entry in new] == list(range(first, first + count)), "counters within a message"
-        assert first >= self._next, "an entry came twice"
-        self.skipped += first - self._next
+        self.skipped += max(0, first - self._next)
         self.backlog_max = max(self.backlog_max, self.next_counter - self._next)
+        # When what was asked for is gone, the replies to several requests begin alike, at the oldest entry.
+        new = [entry for entry in new if entry[1] >= self._next]
         self.entries += new
-        self._next = first + count
-        return count
+        self._next = max(self._next, first + count)
+        return len(new)
 
     def follow_to_the_end(self):
         """Until the board plays no longer and everything is read; returns its status."""
