@@ -111,8 +111,8 @@ Result<Board> Board::connect_any_layout(std::unique_ptr<Transfer> transfer) {
     const ols_hello hello{OLS_LAYOUT_HASH};
     const auto payload = board.request(OLS_HELLO, bytes_of(hello));
     if (!payload.ok()) return payload.error();
-    // The hash comes first in every version of the reply, so it is compared before the length.
-    std::memcpy(&board.info_.layout_hash, payload->data(), std::min(payload->size(), sizeof board.info_.layout_hash));
+    // The hash, the first member, comes first in every version of the reply, so it is compared before the length.
+    std::memcpy(static_cast<void*>(&board.info_), payload->data(), std::min(payload->size(), sizeof(uint64_t)));
     if (payload->size() != sizeof board.info_) {
         if (board.same_layout()) return wrong_reply();
         return board;
