@@ -133,10 +133,10 @@ class BoardModel {
         Bytes payload;
         uint16_t type = frame.type | 0x80;
         if (frame.type == 0x01) {  // hello: PROTOCOL.md
-            payload.resize(88);
+            payload.resize(92);
             std::copy_n(flash.cells.begin() + 0x108 + 8, 8, payload.begin());
             std::copy_n(flash.cells.begin() + 0x108 + 32, 24, payload.begin() + 8);
-            std::copy_n(flash.cells.begin() + 0x108 + 16, 16, payload.begin() + 72);
+            std::copy_n(flash.cells.begin() + 0x108 + 16, 16, payload.begin() + 76);
         } else if (frame.type == 0x0d && !playing) {
             restart_in_ms = 10;
             to_loader_ = true;
