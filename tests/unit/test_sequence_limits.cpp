@@ -145,7 +145,7 @@ TEST(SequenceLimits, a_program_as_long_as_the_memory_leaves_no_room_for_its_even
         OLS_NO_SLOT, "the program is longer than the board's 96256 bytes: send fewer slots");
 }
 
-// One word stays free behind the cycle, for the wait of cycles that start by edges. Waits beyond what one event plays take a word more, long lights and waits several: 1024 slots fill the memory to the
+// Waits beyond what one event plays take a word more, long lights and waits several: 1024 slots fill the memory to the
 // word.
 TEST(SequenceLimits, words_up_to_the_last_one_are_used) {
     const auto filled = [](size_t long_slots, size_t longer_slots) {
@@ -163,11 +163,12 @@ TEST(SequenceLimits, words_up_to_the_last_one_are_used) {
     const uint32_t plain = compile(filled(0, 0)).word_count();
     const uint32_t each = compile(filled(1, 0)).word_count() - plain;
     ASSERT_EQ(compile(filled(0, 1)).word_count() - plain, 1u);
-    const size_t long_slots = (SEQUENCE_WORDS_MAX - 1 - plain) / each - 5;
-    const size_t left = SEQUENCE_WORDS_MAX - 1 - plain - long_slots * each;
+    constexpr uint32_t most = SEQUENCE_WORDS_MAX - 1;  // one more waits for an edge
+    const size_t long_slots = (most - plain) / each - 5;
+    const size_t left = most - plain - long_slots * each;
     const Compiled fits = compile(filled(long_slots, left));
     ASSERT_TRUE(fits.ok) << fits.error.text;
-    EXPECT_EQ(fits.word_count(), SEQUENCE_WORDS_MAX - 1u);
+    EXPECT_EQ(fits.word_count(), most);
     const Compiled over = compile(filled(long_slots, left + 1));
     EXPECT_FALSE(over.ok);
     EXPECT_EQ(over.error.slot, OLS_SLOTS_MAX - 1) << "it is the cycle's end that does not fit";
