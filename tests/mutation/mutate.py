@@ -5,7 +5,7 @@
 usage: mutate.py [--files FILE ...] [--only N ...] [--jobs 2] [--list]
 
 A mutant is one token changed (a comparison, an operator, a constant, a truth value) or one statement left out. It is
-noticed when the tests fail, crash, or take ten times as long as usual; a mutant that does not compile is not counted.
+noticed when the tests fail, crash, or take five times as long as usual; a mutant that does not compile is not counted.
 Survivors are printed with their place and kept in build/mutation/survivors.txt. tests/mutation/equivalent.txt names
 those that change nothing that could be seen, each with its reason; they are left out of the share. Exits with 1 when
 there are others.
@@ -117,18 +117,21 @@ def build():
 
 
 def link_and_run(objects, folder, seconds_max):
-    """True when all tests pass. A library, so that a test may stand in for a part of it."""
-    library = folder / "libmutant.a"
+    """Seconds by test when all pass, else None. `seconds_max` by test. A library, so that a test may stand in for a part
+    of it."""
+    library, seconds = folder / "libmutant.a", {}
     must(["ar", "rcs", library, *objects])
     for test in TESTS:
         program = folder / test
         must(["g++", "-fsanitize=address,undefined", BUILD / f"test_{test}.o", library, "-lgtest", "-lgtest_main", "-o", program])
+        begin = time.monotonic()
         try:
-            if run([program, "--gtest_fail_fast", "--gtest_brief=1"], timeout=seconds_max).returncode != 0:
-                return False
+            if run([program, "--gtest_fail_fast", "--gtest_brief=1"], timeout=seconds_max[test]).returncode != 0:
+                return None
         except subprocess.TimeoutExpired:
-            return False
-    return True
+            return None
+        seconds[test] = time.monotonic() - begin
+    return seconds
 
 
 def verdict(path, text, mutant, seconds_max):
@@ -174,10 +177,10 @@ def main():
         return
     chosen = options.only if options.only is not None else range(len(work))
     build()
-    begin = time.monotonic()
-    if not link_and_run([object_of(path) for path in sources()], BUILD, 600):
+    usual = link_and_run([object_of(path) for path in sources()], BUILD, dict.fromkeys(TESTS, 600))
+    if usual is None:
         raise SystemExit("the tests fail without any mutant: mend that first")
-    seconds_max = 10 * (time.monotonic() - begin) + 5
+    seconds_max = {test: 5 * seconds + 3 for test, seconds in usual.items()}
     known, counts, survivors = equivalents(), {"noticed": 0, "survived": 0, "invalid": 0, "equivalent": 0}, []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         verdicts = pool.map(lambda n: verdict(*work[n], seconds_max), chosen)
