@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
 // USB transfers to the emulated board, carried by an AF_UNIX stream socket (docs/architecture.md).
-#include <fmt/format.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 
 #include "device/transfer.hpp"
+#include "device/unix_socket.hpp"
 
 namespace ols {
 
@@ -89,27 +87,11 @@ class SocketTransfer : public Transfer {
     }
 
     Status send_all(const void* bytes, size_t count) {
-        const auto* at = static_cast<const uint8_t*>(bytes);
-        while (count > 0) {
-            const ssize_t sent = ::send(fd_, at, count, MSG_NOSIGNAL);
-            if (sent < 0 && errno == EINTR) continue;
-            if (sent <= 0) return lost();
-            at += sent;
-            count -= size_t(sent);
-        }
-        return Done{};
+        return send_whole(fd_, bytes, count) ? Status(Done{}) : Status(lost());
     }
 
     Status receive_all(void* bytes, size_t count) {
-        auto* at = static_cast<uint8_t*>(bytes);
-        while (count > 0) {
-            const ssize_t got = ::recv(fd_, at, count, 0);
-            if (got < 0 && errno == EINTR) continue;
-            if (got <= 0) return lost();
-            at += got;
-            count -= size_t(got);
-        }
-        return Done{};
+        return receive_whole(fd_, bytes, count) ? Status(Done{}) : Status(lost());
     }
 
     Error lost() const { return fail("the board at '" + path_ + "' is gone: start the stage again"); }
@@ -122,20 +104,9 @@ class SocketTransfer : public Transfer {
 }  // namespace
 
 Result<std::unique_ptr<Transfer>> open_socket_transfer(const std::string& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    if (path.empty() || path.size() >= sizeof address.sun_path)
-        return fail(fmt::format("socket path '{}' must have 1 to {} characters", path, sizeof address.sun_path - 1));
-    std::memcpy(address.sun_path, path.c_str(), path.size());
-    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd < 0) return fail(fmt::format("cannot make a socket: {}", std::strerror(errno)));
-    if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        const int error = errno;
-        ::close(fd);
-        return fail(
-            fmt::format("cannot reach the board at '{}': {}; start the stage first", path, std::strerror(error)));
-    }
-    return std::unique_ptr<Transfer>(std::make_unique<SocketTransfer>(fd, path));
+    const auto fd = connect_unix(path, "the board");
+    if (!fd.ok()) return fd.error();
+    return std::unique_ptr<Transfer>(std::make_unique<SocketTransfer>(*fd, path));
 }
 
 }  // namespace ols

@@ -272,9 +272,9 @@ void invert(const HadamardJob& job, size_t begin, size_t end, TileScratch& scrat
     for (; begin < end; begin += tile_samples) {
         const size_t count = std::min(tile_samples, end - begin);
         counts.tiles++;
-        if (invert_short(job, begin, count, scratch.short_places)) continue;
+        if (invert_short(job, begin, count, scratch.short_places())) continue;
         counts.fallbacks++;
-        invert_long(job, begin, count, scratch.long_places);
+        invert_long(job, begin, count, scratch.long_places());
     }
 }
 
@@ -287,18 +287,7 @@ namespace ols {
 
 HWY_EXPORT(invert);
 
-TileScratch::TileScratch(const SumCode& code) {
-    const size_t lanes = size_t(code.places) * tile_samples;
-    short_places = static_cast<int16_t*>(std::aligned_alloc(64, lanes * sizeof *short_places));
-    long_places = static_cast<int32_t*>(std::aligned_alloc(64, lanes * sizeof *long_places));
-    std::fill_n(short_places, lanes, int16_t(0));
-    std::fill_n(long_places, lanes, 0);
-}
-
-TileScratch::~TileScratch() {
-    std::free(short_places);
-    std::free(long_places);
-}
+TileScratch::TileScratch(const SumCode& code) : places16_(size_t(code.places)), places32_(size_t(code.places)) {}
 
 void invert_tiles(const HadamardJob& job, size_t begin, size_t end, TileScratch& scratch, TileCounts& counts) {
     HWY_DYNAMIC_DISPATCH(invert)(job, begin, end, scratch, counts);

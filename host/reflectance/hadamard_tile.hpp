@@ -20,7 +20,7 @@ struct HadamardJob {
     // One of the two: a pointer a row.
     std::span<const int16_t* const> rows16;
     std::span<const int32_t* const> rows32;  // |counts| < 2^23
-    // One of the two: a pointer a lamp. Sums are z itself, those outside int16 refused; floats are z times factor.
+    // One of the two: a pointer a lamp. Sums are z itself; floats are z times factor.
     std::span<float* const> lamps;
     std::span<int32_t* const> sums;
     std::span<const float> factors;  // a sample each
@@ -34,12 +34,17 @@ struct TileCounts {
 class TileScratch {
   public:
     explicit TileScratch(const SumCode& code);
-    ~TileScratch();
-    TileScratch(const TileScratch&) = delete;
-    TileScratch& operator=(const TileScratch&) = delete;
 
-    int16_t* short_places;
-    int32_t* long_places;
+    int16_t* short_places() { return places16_.data()->samples; }
+    int32_t* long_places() { return places32_.data()->samples; }
+
+  private:
+    template <typename Sample>
+    struct alignas(64) Place {
+        Sample samples[tile_samples];
+    };
+    std::vector<Place<int16_t>> places16_;
+    std::vector<Place<int32_t>> places32_;
 };
 
 // Inverts samples begin..end-1.

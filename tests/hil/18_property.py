@@ -22,12 +22,7 @@ def test_what_the_pins_do_is_what_a_random_program_says_by_two_checkers(emulated
     board = emulated(*(["--inject", f"genlock@{EDGE}"] if start == wire.BY_EDGE else []), trace=True)
     link = board.plug()
     program = random_program(pick, link.hello(0))
-    link.load(program)
-    link.arm(start=start)
-    link.ask(wire.START)
-    while (status := link.status())["state"] in (wire.WAITING, wire.PLAYING):
-        link.usb.read(timeout_us=1_000)
-    assert (status["state"], status["fault"]) == (wire.DONE, 0)
+    link.play_to_the_end(program, start)
     board.stop()
     report = check_trace.check(board.trace, program)
     assert report["right"], report

@@ -17,18 +17,10 @@ def hex_digits(bits):
     return f"{int(''.join(map(str, bits)), 2):0{len(bits) // 4}x}"
 
 
-def play_to_the_end(board, program):
-    link = board.plug()
-    link.play(program)
-    status = link.wait_until([wire.DONE, wire.FAULT])
-    assert status["fault"] == 0, wire.FAULTS[status["fault"]]
-    return link
-
-
 def test_every_trigger_and_shift_word_of_two_cycles_is_right_by_two_checkers(emulated, tmp_path):
     program = paper_program(cycles=2)
     board = emulated(trace=True)
-    play_to_the_end(board, program)
+    board.plug().play_to_the_end(program)
     board.stop()
     (tmp_path / "program.json").write_text(json.dumps(program))
     result = subprocess.run([sys.executable, ROOT / "tests/hil/check_trace.py", board.trace, tmp_path / "program.json"],
@@ -43,7 +35,7 @@ def test_every_trigger_and_shift_word_of_two_cycles_is_right_by_two_checkers(emu
 def test_the_checker_notices_a_trigger_moved_by_one_tick_and_a_wrong_lamp(emulated):
     program = paper_program(cycles=1, slots=18)
     board = emulated(trace=True)
-    play_to_the_end(board, program)
+    board.plug().play_to_the_end(program)
     board.stop()
     assert check_trace.check(board.trace, program)["right"]
     wrong_lamp = json.loads(json.dumps(program))
@@ -64,7 +56,8 @@ def test_exposures_carry_the_lamps_and_exact_ticks_of_their_slots(emulated):
     received = []
     reader = threading.Thread(target=lambda: received.extend(board.exposures_until("exposure", 180)))
     reader.start()
-    link = play_to_the_end(board, program)
+    link = board.plug()
+    link.play_to_the_end(program)
     reader.join(timeout=30)
     hello = received[0]
     exposures = [message for message in received if message["type"] == "exposure"]
@@ -102,7 +95,7 @@ def test_stepping_every_cycle_gives_the_same_edges(emulated):
 def test_a_uf2_file_plays_as_the_elf_file_does(emulated):
     program = paper_program(cycles=1, slots=18)
     board = emulated(trace=True, image=ROOT / "build/firmware/stage.uf2")
-    play_to_the_end(board, program)
+    board.plug().play_to_the_end(program)
     board.stop()
     assert check_trace.check(board.trace, program)["right"]
 
@@ -138,7 +131,7 @@ def test_a_program_that_cannot_be_played_is_refused_with_its_slot(emulated, dama
 def test_the_image_of_another_board_plays_the_same_on_its_own_pins(emulated):
     program = paper_program(cycles=1, slots=18)
     board = emulated(trace=True, image=ROOT / "build/firmware/feather_can/stage.uf2")
-    play_to_the_end(board, program)
+    board.plug().play_to_the_end(program)
     board.stop()
     assert check_trace.check(board.trace, program)["right"]
 
@@ -154,7 +147,7 @@ def test_an_image_connected_as_another_board_reaches_no_lamp(emulated):
 
 def test_latch_is_never_high_while_the_clock_rises_so_the_drivers_stay_in_their_normal_mode(emulated):
     board = emulated(trace=True)
-    play_to_the_end(board, paper_program(cycles=2, slots=18))
+    board.plug().play_to_the_end(paper_program(cycles=2, slots=18))
     board.stop()
     high, rises, together = set(), 0, 0
     for _, name, level in check_trace.read_vcd(board.trace):

@@ -103,13 +103,7 @@ def test_slots_of_each_kind_change_every_pin_when_an_independent_emulator_does(e
     program = {"cycles": 2 if start == wire.BY_COMMAND else 1, "chain_bits": 176, **KINDS[kind]}
     edge = 400 * 125_000
     board = emulated(*(["--inject", f"genlock@{edge}"] if start == wire.BY_EDGE else []), trace=True)
-    link = board.plug()
-    link.load(program)
-    link.arm(start=start)
-    link.ask(wire.START)
-    while (status := link.status())["state"] in (wire.WAITING, wire.PLAYING):
-        link.usb.read(timeout_us=1_000)
-    assert (status["state"], status["fault"]) == (wire.DONE, 0)
+    board.plug().play_to_the_end(program, start)
     board.stop()
 
     genlock_tick = 3700 if start == wire.BY_EDGE else None

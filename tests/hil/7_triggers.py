@@ -30,18 +30,11 @@ def four_camera_program():
     return program
 
 
-def play(board, program):
-    link = board.plug()
-    link.play(program)
-    status = link.wait_until([wire.DONE, wire.FAULT])
-    assert status["fault"] == 0, wire.FAULTS[status["fault"]]
-    return link
-
-
 def test_four_triggers_with_offsets_widths_kinds_and_polarity_are_right_by_two_checkers(emulated):
     program = four_camera_program()
     board = emulated(trace=True)
-    link = play(board, program)
+    link = board.plug()
+    link.play_to_the_end(program)
     entries, lost = link.trigger_log()
     board.stop()
     report = check_trace.check(board.trace, program)
@@ -56,7 +49,7 @@ def test_four_triggers_with_offsets_widths_kinds_and_polarity_are_right_by_two_c
 def test_the_checker_notices_an_offset_that_is_one_tick_off(emulated):
     program = four_camera_program()
     board = emulated(trace=True)
-    play(board, program)
+    board.plug().play_to_the_end(program)
     board.stop()
     program["triggers"][1]["offset_ticks"] += 1
     report = check_trace.check(board.trace, program)
@@ -71,7 +64,8 @@ def test_an_active_low_trigger_0_is_logged_and_exposes_while_it_is_low(emulated)
     received = []
     reader = threading.Thread(target=lambda: received.extend(board.exposures_until("exposure", 18)))
     reader.start()
-    link = play(board, program)
+    link = board.plug()
+    link.play_to_the_end(program)
     entries, _ = link.trigger_log()
     assert [entry[3] for entry in entries] == list(range(18))
     reader.join(timeout=30)

@@ -155,7 +155,7 @@ TEST_P(HadamardInverse, ordinary_counts_need_no_fallback) {
 }
 
 // A plain sum takes rows - 1 additions a lamp: 24 648 and 24 180.
-TEST(HadamardPlan, takes_a_ninth_and_less_of_the_additions) {
+TEST(HadamardPlan, takes_a_ninth_and_a_seventh_of_the_additions) {
     EXPECT_LE(hadamard_plan(*find_basis("s159"))->plan.additions(), 2718);
     EXPECT_LE(hadamard_plan(*find_basis("hadamard156"))->plan.additions(), 3615);
 }

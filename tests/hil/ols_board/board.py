@@ -186,6 +186,16 @@ class Link:
         self.arm(heartbeat_ticks)
         self.ask(wire.START)
 
+    def play_to_the_end(self, program, start=wire.BY_COMMAND):
+        """Plays all cycles; the board must not end in a fault."""
+        self.load(program)
+        self.arm(start=start)
+        self.ask(wire.START)
+        while (status := self.status())["state"] in (wire.WAITING, wire.PLAYING):
+            if status["state"] == wire.WAITING:
+                self.usb.read(timeout_us=1_000)  # nothing comes: board time passes
+        assert (status["state"], status["fault"]) == (wire.DONE, 0), wire.FAULTS[status["fault"]]
+
     def swap(self):
         """Lets the loaded next program follow; returns after how many cycles, and its number."""
         return wire.SWAP_REPLY.unpack(self.ask(wire.SWAP))

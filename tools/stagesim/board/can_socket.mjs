@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The bus end as a socket (docs/architecture.md, "CAN frames over a socket"): every client is a node with a controller
 // that never tires. Records of 16 bytes, Linux's struct can_frame.
-import { existsSync, lstatSync, unlinkSync } from 'node:fs';
 import { createServer } from 'node:net';
 import { decodeFrame, encodeFrame, FRAME_BYTES } from './can_frame.mjs';
+import { listenAt } from './listen.mjs';
 
 const NOW_ID = 0xffffffff; // a record with the board's time instead of a frame
 const BACKLOG_BYTES = 1 << 20; // of a client that does not read: then it is cut off
@@ -86,18 +86,9 @@ export class CanSocket {
     return this.#nodes.size > 0;
   }
 
-  /** @returns {Promise<void>} listening; an old socket file of that name is replaced, any other file is not */
+  /** @returns {Promise<void>} listening */
   listen() {
-    if (existsSync(this.#path)) {
-      if (!lstatSync(this.#path).isSocket()) {
-        return Promise.reject(new Error(`${this.#path}: exists and is not a socket; remove it or name another`));
-      }
-      unlinkSync(this.#path);
-    }
-    return new Promise((resolve, reject) => {
-      this.#server.once('error', (error) => reject(new Error(`${this.#path}: cannot listen (${error.code})`)));
-      this.#server.listen(this.#path, resolve);
-    });
+    return listenAt(this.#path, this.#server);
   }
 
   /** Tells all clients the time, so that they can time out in the board's. */

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The USB cable as a socket: a client that connects plugs the board in, its requests are transfers
 // (docs/architecture.md, "USB transfers over a socket").
-import { existsSync, lstatSync, unlinkSync } from 'node:fs';
 import { createServer } from 'node:net';
+import { listenAt } from './listen.mjs';
 
 const REQUEST_MAGIC = 0x54425355; // "USBT"
 const REPLY_MAGIC = 0x52425355; // "USBR"
@@ -39,18 +39,9 @@ export class UsbSocket {
     this.#server = createServer((socket) => this.#accept(socket));
   }
 
-  /** @returns {Promise<void>} listening; an old socket file of that name is replaced, any other file is not */
+  /** @returns {Promise<void>} listening */
   listen() {
-    if (existsSync(this.#path)) {
-      if (!lstatSync(this.#path).isSocket()) {
-        return Promise.reject(new Error(`${this.#path}: exists and is not a socket; remove it or name another`));
-      }
-      unlinkSync(this.#path);
-    }
-    return new Promise((resolve, reject) => {
-      this.#server.once('error', (error) => reject(new Error(`${this.#path}: cannot listen (${error.code})`)));
-      this.#server.listen(this.#path, resolve);
-    });
+    return listenAt(this.#path, this.#server);
   }
 
   /** The device has gone: pending transfers have been answered, the client must connect anew. */
