@@ -122,7 +122,6 @@ std::vector<float> sample_factors(const Basis& basis, size_t samples, const Demu
 struct LaidOutPlan {
     std::vector<int8_t> weights;  // of the basis that it was made for
     HadamardPlan plan;
-    SumCode code;
 };
 
 std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
@@ -132,19 +131,17 @@ std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
     const auto known = plans.find(basis.name);
     if (known != plans.end() && (!known->second || known->second->weights == basis.weights)) return known->second;
     std::shared_ptr<const LaidOutPlan> made;
-    if (auto plan = hadamard_plan(basis)) {
-        SumCode code = lay_out(plan->plan, {plan->extra_row});
-        made = std::make_shared<LaidOutPlan>(LaidOutPlan{basis.weights, std::move(*plan), std::move(code)});
-    }
+    if (auto plan = hadamard_plan(basis))
+        made = std::make_shared<LaidOutPlan>(LaidOutPlan{basis.weights, std::move(*plan)});
     return plans[basis.name] = made;
 }
 
 void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const int32_t* const> rows,
                          size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
-    const HadamardJob job{&made.plan, &made.code, {}, rows, lamps, {}, factors};
+    const HadamardJob job{.plan = &made.plan, .rows32 = {rows}, .floats = {lamps}, .factors = factors};
     for_each_tile(samples, options.threads, [&] {
-        return [&, scratch = std::make_unique<TileScratch>(made.code)](size_t begin, size_t count) {
+        return [&, scratch = std::make_unique<TileScratch>(made.plan)](size_t begin, size_t count) {
             TileCounts counts;
             invert_tiles(job, begin, begin + count, *scratch, counts);
         };
