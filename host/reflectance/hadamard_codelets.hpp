@@ -13,7 +13,7 @@ namespace ols {
 enum class Codelet { paley_80, williamson_even, williamson_odd, williamson_merge };
 
 inline constexpr std::array codelets = {Codelet::paley_80, Codelet::williamson_even, Codelet::williamson_odd,
-                                 Codelet::williamson_merge};
+                                        Codelet::williamson_merge};
 
 const char* codelet_name(Codelet codelet);
 

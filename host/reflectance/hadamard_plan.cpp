@@ -17,9 +17,9 @@ HadamardPlan steps_of_s159() {
     made.order = 2 * half;
     made.singles.push_back({half - 1, 0, half});
     for (int r = 1; r < half; ++r) made.pairs.push_back({r - 1, r + half - 1, r, half + r});
-    made.first_output = 2 * half;
-    made.places = made.first_output + made.order;
-    made.steps = {{Codelet::paley_80, 0, made.first_output}, {Codelet::paley_80, half, made.first_output + half}};
+    made.steps = {{Codelet::paley_80, 0, 2 * half}, {Codelet::paley_80, half, 0}};  // u has been used by then
+    made.places = 3 * half;
+    for (int k = 1; k < made.order; ++k) made.outputs.push_back(k < half ? 2 * half + k : k - half);
     for (int lamp = 0; lamp < sphere_lamp_count; ++lamp) made.lamp_output.push_back(lamp + 1);
     return made;
 }
@@ -44,7 +44,8 @@ HadamardPlan steps_of_hadamard156() {
     made.places = 2 * parts + made.order - 1;
     made.steps = {{Codelet::williamson_even, 0, 2 * parts},
                   {Codelet::williamson_odd, parts, 3 * parts - 1},  // behind the 79 even sums
-                  {Codelet::williamson_merge, 2 * parts, 1}};
+                  {Codelet::williamson_merge, 2 * parts, 0}};
+    for (int k = 1; k < made.order; ++k) made.outputs.push_back(k - 1);
     for (int lamp = 0; lamp < sphere_lamp_count; ++lamp) made.lamp_output.push_back(lamp);
     made.extra_weight = -made.order / 2;  // to the weight of row 0 for lamp 0
     return made;
@@ -67,7 +68,7 @@ SumPlan whole_plan(const HadamardPlan& made) {
         const std::vector<int> outputs = whole.append(part, {from, from + part.inputs()});
         std::copy(outputs.begin(), outputs.end(), values.begin() + step.to);
     }
-    for (int k = 1; k < made.order; ++k) whole.add_output(values[size_t(made.first_output + k)]);
+    for (const int place : made.outputs) whole.add_output(values[size_t(place)]);
     return whole;
 }
 

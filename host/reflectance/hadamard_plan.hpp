@@ -31,7 +31,8 @@ struct HadamardPlan {
     std::vector<Pair> pairs;
     std::vector<Single> singles;
     std::vector<Step> steps;
-    int places = 0, first_output = 0;  // z(k) comes to place first_output + k, k = 1..n-1
+    int places = 0;
+    std::vector<int> outputs;  // places where z(1)..z(n-1) come to lie
 
     std::vector<int> lamp_output;  // by lamp: its k, or 0 for the sum of all rows
     // The lamp with output 0, if there is one, is the sum of all rows plus `extra_weight` times row `extra_row`.

@@ -28,6 +28,19 @@ namespace ols {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+using Shorts = hn::CappedTag<int16_t, tile_samples>;
+using Longs = hn::CappedTag<int32_t, tile_samples / 2>;  // as many bytes
+
+// What codelets add up: the compiler's own vectors, of which it keeps more in registers than of Highway's structures.
+typedef int16_t ShortLanes __attribute__((vector_size(hn::MaxLanes(Shorts()) * sizeof(int16_t)), may_alias));
+
+HWY_INLINE ShortLanes& at(int16_t* places, size_t place) {
+    return *reinterpret_cast<ShortLanes*>(places + place * tile_samples);
+}
+HWY_INLINE const ShortLanes& at(const int16_t* places, size_t place) {
+    return *reinterpret_cast<const ShortLanes*>(places + place * tile_samples);
+}
+
 #include "hadamard_codelets.inc"
 
 void run_codelet(Codelet codelet, const int16_t* from, int16_t* to) {
@@ -38,9 +51,6 @@ void run_codelet(Codelet codelet, const int16_t* from, int16_t* to) {
         case Codelet::williamson_merge: return williamson_merge(from, to);
     }
 }
-
-using Shorts = hn::CappedTag<int16_t, tile_samples>;
-using Longs = hn::CappedTag<int32_t, tile_samples / 2>;  // as many bytes
 
 HWY_INLINE auto load_long(const int32_t* z) {
     return hn::Load(Longs(), z);
@@ -132,11 +142,13 @@ void split_rows(const HadamardPlan& plan, const TileRows& tile, int16_t* HWY_RES
     alignas(64) int16_t wrapped_sums[tile_samples], coarse_sums[tile_samples];
     for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) {
         auto wrapped = hn::Zero(d), coarse = hn::Zero(d);
+        const auto* const rows = tile.rows;
+        const size_t offset = tile.offset + i, ahead = tile.ahead;
         for (const HadamardPlan::Pair& pair : plan.pairs) {
-            const int16_t* const first = tile.rows[pair.first] + tile.offset + i;
-            const int16_t* const second = tile.rows[pair.second] + tile.offset + i;
-            hwy::Prefetch(first + tile.ahead);
-            hwy::Prefetch(second + tile.ahead);
+            const int16_t* const first = rows[pair.first] + offset;
+            const int16_t* const second = rows[pair.second] + offset;
+            hwy::Prefetch(first + ahead);
+            hwy::Prefetch(second + ahead);
             const auto a = hn::LoadU(d, first), b = hn::LoadU(d, second), sum = hn::Add(a, b);
             hn::Store(sum, d, places + size_t(pair.sum) * tile_samples + i);
             hn::Store(hn::Sub(a, b), d, places + size_t(pair.difference) * tile_samples + i);
@@ -146,7 +158,7 @@ void split_rows(const HadamardPlan& plan, const TileRows& tile, int16_t* HWY_RES
             coarse = hn::Add(coarse, hn::Add(hn::ShiftRight<unit_log2>(a), hn::ShiftRight<unit_log2>(b)));
         }
         for (const HadamardPlan::Single& single : plan.singles) {
-            const auto a = hn::LoadU(d, tile.rows[single.row] + tile.offset + i);
+            const auto a = hn::LoadU(d, rows[single.row] + offset);
             hn::Store(a, d, places + size_t(single.place) * tile_samples + i);
             hn::Store(hn::Neg(a), d, places + size_t(single.negated) * tile_samples + i);
             squares.add(a, hn::Zero(d));
@@ -171,16 +183,17 @@ bool certify(const HadamardPlan& plan, const int16_t* HWY_RESTRICT places, const
     const Shorts d;
     SquareSum squares;
     auto least = hn::Zero(d);
-    const int16_t* at = places + size_t(plan.first_output + 1) * tile_samples;
-    const int16_t* const end = at + size_t(plan.order - 1) * tile_samples;
-    for (; at + hn::Lanes(d) < end; at += 2 * hn::Lanes(d)) {
-        const auto a = hn::Load(d, at), b = hn::Load(d, at + hn::Lanes(d));
-        squares.add(a, b);
-        least = hn::Min(least, hn::Min(a, b));
-    }
-    if (at < end) {
-        squares.add(hn::Load(d, at), hn::Zero(d));
-        least = hn::Min(least, hn::Load(d, at));
+    const auto z = [&](size_t k) { return places + size_t(plan.outputs[k - 1]) * tile_samples; };
+    for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) {
+        size_t k = 1;
+        for (; k + 1 < size_t(plan.order); k += 2) {
+            const auto a = hn::Load(d, z(k) + i), b = hn::Load(d, z(k + 1) + i);
+            squares.add(a, b);
+            least = hn::Min(least, hn::Min(a, b));
+        }
+        const auto last = hn::Load(d, z(size_t(plan.order - 1)) + i);  // the order is even
+        squares.add(last, hn::Zero(d));
+        least = hn::Min(least, last);
     }
     int64_t square_of_sums = 0;
     for (const int32_t sum : sums.sums) square_of_sums += int64_t(sum) * sum;
@@ -234,6 +247,15 @@ HWY_INLINE auto converted(LongVector z, const float* factors, uint16_t) {
     return half_of(converted(z, factors, float()));
 }
 
+// Stream for vectors of 16 bytes or more, which alone there are instructions for.
+template <class V, class D, typename Value>
+HWY_INLINE void write_past(V v, D d, Value* to) {
+    if constexpr (hn::MaxLanes(D()) * sizeof(Value) >= 16)
+        hn::Stream(v, d, to);
+    else
+        hn::Store(v, d, to);
+}
+
 // Where a tile's values go: whole aligned tiles past the caches, as they are not read again soon.
 template <typename Value>
 struct Sink {
@@ -259,7 +281,7 @@ struct Sink {
             for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) hn::Stream(hn::Load(d, z + i), d, to + i);
         } else {
             for (size_t i = 0; i < tile_samples; i += hn::Lanes(Longs()))
-                hn::Stream(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), to + i);
+                write_past(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), to + i);
         }
     }
 };
@@ -372,7 +394,7 @@ class TileInverter {
             run_codelet(step.codelet, places + size_t(step.from) * tile_samples,
                         places + size_t(step.to) * tile_samples);
         if (!certify(plan_, places, sums)) return false;
-        const auto z = [&](size_t k) { return places + (size_t(plan_.first_output) + k) * tile_samples; };
+        const auto z = [&](size_t k) { return places + size_t(plan_.outputs[k - 1]) * tile_samples; };
         store_lamps(job_, begin, count, z, tile.rows[plan_.extra_row] + tile.offset, sums.sums);
         return true;
     }

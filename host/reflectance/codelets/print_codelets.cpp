@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Prints every codelet (hadamard_codelets.hpp) as a C++ function on Highway's vectors: one statement a sum, so that the
-// compiler keeps in registers what it can.
+// Prints every codelet (hadamard_codelets.hpp) as a C++ function: one statement a sum, so that the compiler keeps in
+// registers what it can.
 #include <cstdio>
 #include <string>
 
@@ -10,15 +10,10 @@ namespace {
 
 std::string expression(const ols::Terms& terms) {
     std::string text;
-    for (const bool positive : {true, false})
-        for (const ols::Term term : terms) {
-            if ((term.sign > 0) != positive) continue;
-            const std::string value = "v" + std::to_string(term.value);
-            if (text.empty())
-                text = positive ? value : "hn::Neg(" + value + ")";
-            else
-                text = (positive ? "hn::Add(" : "hn::Sub(") + text + ", " + value + ")";
-        }
+    for (const bool positive : {true, false})  // a leading minus would cost a negation
+        for (const ols::Term term : terms)
+            if ((term.sign > 0) == positive)
+                text += (positive ? text.empty() ? "" : " + " : " - ") + ("v" + std::to_string(term.value));
     return text;
 }
 
@@ -27,17 +22,13 @@ void print_codelet(ols::Codelet codelet) {
     std::printf("// %d to %zu values by %d additions.\n", plan.inputs(), plan.outputs().size(), plan.additions());
     std::printf("HWY_NOINLINE void %s(const int16_t* HWY_RESTRICT from, int16_t* HWY_RESTRICT to) {\n",
                 ols::codelet_name(codelet));
-    std::printf("const hn::CappedTag<int16_t, tile_samples> d;\n");
-    std::printf(
-        "for (const int16_t* const end = from + tile_samples; from < end; from += hn::Lanes(d), to += "
-        "hn::Lanes(d)) {\n");
+    std::printf("for (size_t i = 0; i < tile_samples; i += sizeof(ShortLanes) / sizeof(int16_t)) {\n");
     int value = 0;
     for (; value < plan.inputs(); ++value)
-        std::printf("[[maybe_unused]] const auto v%d = hn::Load(d, from + %d * tile_samples);\n", value, value);
+        std::printf("[[maybe_unused]] const ShortLanes v%d = at(from + i, %d);\n", value, value);
     for (const ols::Terms& terms : plan.all_sums())
-        std::printf("const auto v%d = %s;\n", value++, expression(terms).c_str());
-    for (size_t k = 0; k < plan.outputs().size(); ++k)
-        std::printf("hn::Store(v%d, d, to + %zu * tile_samples);\n", plan.outputs()[k], k);
+        std::printf("const ShortLanes v%d = %s;\n", value++, expression(terms).c_str());
+    for (size_t k = 0; k < plan.outputs().size(); ++k) std::printf("at(to + i, %zu) = v%d;\n", k, plan.outputs()[k]);
     std::printf("}\n}\n\n");
 }
 
