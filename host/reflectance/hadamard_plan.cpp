@@ -11,7 +11,7 @@ namespace {
 // S-159: H of order 160 is [P P; P -P], so that H' y is P' u and P' v for the sums u and the differences v of the upper
 // and the lower half of y. The first row of H, which is no slot, counts as zero: row 79 is left alone. A lamp is lit
 // where H is negative, so the outputs are those of -H'.
-HadamardPlan steps_of_s159() {
+HadamardPlan steps_of_s159(int lamps) {
     constexpr int half = 80;
     HadamardPlan made;
     made.order = 2 * half;
@@ -20,7 +20,7 @@ HadamardPlan steps_of_s159() {
     made.steps = {{Codelet::paley_80, 0, 2 * half}, {Codelet::paley_80, half, 0}};  // u has been used by then
     made.places = 3 * half;
     for (int k = 1; k < made.order; ++k) made.outputs.push_back(k < half ? 2 * half + k : k - half);
-    for (int lamp = 0; lamp < sphere_lamp_count; ++lamp) made.lamp_output.push_back(lamp + 1);
+    for (int lamp = 0; lamp < lamps; ++lamp) made.lamp_output.push_back(lamp + 1);
     return made;
 }
 
@@ -46,7 +46,7 @@ HadamardPlan steps_of_hadamard156() {
                   {Codelet::williamson_odd, parts, 3 * parts - 1},  // behind the 79 even sums
                   {Codelet::williamson_merge, 2 * parts, 0}};
     for (int k = 1; k < made.order; ++k) made.outputs.push_back(k - 1);
-    for (int lamp = 0; lamp < sphere_lamp_count; ++lamp) made.lamp_output.push_back(lamp);
+    for (int lamp = 0; lamp < made.order; ++lamp) made.lamp_output.push_back(lamp);
     made.extra_weight = -made.order / 2;  // to the weight of row 0 for lamp 0
     return made;
 }
@@ -74,9 +74,10 @@ SumPlan whole_plan(const HadamardPlan& made) {
 
 // What the plan computes is what the basis asks for.
 bool matches(const HadamardPlan& made, const Basis& basis) {
-    if (basis.rows != made.rows || basis.lamps != int(made.lamp_output.size())) return false;
+    if (basis.rows != made.rows || basis.images() != int(made.lamp_output.size()) || !basis.has_integers())
+        return false;
     const auto outputs = made.whole.matrix();
-    for (int lamp = 0; lamp < basis.lamps; ++lamp)
+    for (int lamp = 0; lamp < basis.images(); ++lamp)
         for (int row = 0; row < basis.rows; ++row) {
             const int output = made.lamp_output[size_t(lamp)];
             const int weight = output > 0 ? outputs[size_t(output - 1)][size_t(row)]
@@ -91,7 +92,7 @@ bool matches(const HadamardPlan& made, const Basis& basis) {
 std::optional<HadamardPlan> hadamard_plan(const Basis& basis) {
     HadamardPlan made;
     if (basis.name == "s159")
-        made = steps_of_s159();
+        made = steps_of_s159(basis.images());
     else if (basis.name == "hadamard156")
         made = steps_of_hadamard156();
     else
