@@ -11,6 +11,9 @@
 // +-20400, which together give it exactly.
 #include "reflectance/hadamard_tile.hpp"
 
+// No processor made since 2008 has SSSE3 and not SSE4.1, and each path takes seconds to compile.
+#define HWY_DISABLED_TARGETS HWY_SSSE3
+
 #include <algorithm>
 #include <cassert>
 #include <cstring>
@@ -117,7 +120,6 @@ void play(const SumCode& plan, int32_t* HWY_RESTRICT places) {
 }
 
 // The rows of a tile: sample i of row r is rows[r][offset + i].
-constexpr size_t tiles_ahead = 2;
 struct TileRows {
     const int16_t* const* rows;
     size_t offset, ahead;  // ahead: from here to the samples to fetch into the cache for a tile to come
@@ -286,35 +288,46 @@ struct Sink {
     }
 };
 
-// All lamps of a tile, from outputs in either width: z(k) at z(k).
+uint64_t count_clipped(const int32_t* z, size_t count) {
+    return uint64_t(std::count_if(z, z + count, [](int32_t v) { return v != std::clamp(v, INT16_MIN, INT16_MAX); }));
+}
+
+// All lamps of a tile, from outputs in either width: those of z(k) at z(k). Returns how many were clipped.
 template <typename Lane, typename Value, typename Z>
-void store_lamps(const HadamardPlan& plan, const Sink<Value>& sink, const Z& z, const Lane* extra_row,
-                 const int32_t* sums) {
+uint64_t store_lamps(const HadamardPlan& plan, const Sink<Value>& sink, const Z& z, const Lane* extra_row,
+                     const int32_t* sums) {
+    uint64_t clipped = 0;
+    const auto put = [&](size_t lamp, const auto* values) HWY_ATTR {
+        sink.put(lamp, values);
+        if constexpr (std::is_same_v<Value, int16_t> && std::is_same_v<decltype(values), const int32_t*>)
+            clipped += count_clipped(values, sink.count);
+    };
     for (size_t lamp = 0; lamp < plan.lamp_output.size(); ++lamp) {
         const int output = plan.lamp_output[lamp];
         if (output > 0) {
-            sink.put(lamp, z(size_t(output)));
+            put(lamp, z(size_t(output)));
         } else {
             alignas(64) int32_t wide[tile_samples];
             for (size_t i = 0; i < tile_samples; ++i) wide[i] = sums[i] + plan.extra_weight * extra_row[i];
-            sink.put(lamp, wide);
+            put(lamp, static_cast<const int32_t*>(wide));
         }
     }
+    return clipped;
 }
 
 template <typename Lane, typename Z>
-void store_lamps(const HadamardJob& job, size_t begin, size_t count, const Z& z, const Lane* extra_row,
-                 const int32_t* sums) {
+uint64_t store_lamps(const HadamardJob& job, size_t begin, size_t count, const Z& z, const Lane* extra_row,
+                     const int32_t* sums) {
     alignas(64) float factors[tile_samples];
     if (!job.factors.empty()) std::copy_n(job.factors.data() + begin, count, factors);
-    const auto store = [&](const auto& planes) {
-        if (!planes.empty())
-            store_lamps(
-                *job.plan,
-                Sink<std::remove_cvref_t<decltype(*planes.first[0])>>{planes, planes.offset(begin), count, factors}, z,
-                extra_row, sums);
+    uint64_t clipped = 0;
+    const auto store = [&]<typename Value>(const Planes<Value>& planes) HWY_ATTR {
+        if (planes.empty()) return;
+        const Sink<Value> sink{planes, planes.offset(begin), count, factors};
+        clipped += store_lamps(*job.plan, sink, z, extra_row, sums);
     };
     store(job.sums), store(job.shorts), store(job.floats), store(job.halves);
+    return clipped;
 }
 
 // Copies the tile of a row, of 32 bits at `from`, to one of 16. False when a count does not fit.
@@ -331,6 +344,16 @@ bool narrow_row(const int32_t* from, size_t count, int16_t* HWY_RESTRICT to) {
         hn::Store(demoted, narrow, to + i);
     }
     return hn::AllTrue(d, hn::Eq(wrong, hn::Zero(d)));
+}
+
+// What is fetched into caches before it is needed. The nearest one gets the tile after the next. Plain images are also
+// fetched into the second, half a kilobyte an image at a time: a line of each in turn would have the memory open a
+// page for every line, and where images are a multiple of 4 KB apart, as most are, the lines of all rows would contend
+// for one set of the nearest cache for longer than it can hold them. Tiles lie one behind the other, as the processor expects.
+constexpr size_t tiles_ahead = 2, tiles_fetched = 8;
+
+HWY_INLINE void fetch_second(const int16_t* samples) {
+    __builtin_prefetch(samples, 0, 2);  // past the end of a row it does nothing
 }
 
 class TileInverter {
@@ -367,12 +390,15 @@ class TileInverter {
                    invert_short({copies_.data(), 0, 0}, begin, count);
         }
         const size_t offset = job_.rows16.offset(begin);
+        if (job_.rows16.tile_step == tile_samples && begin / tile_samples % tiles_fetched == 0)
+            for (const int16_t* row : job_.rows16.first)
+                for (size_t k = tiles_fetched; k < 2 * tiles_fetched; ++k)
+                    fetch_second(row + offset + k * tile_samples);
         if (count == tile_samples)
             return invert_short({job_.rows16.first.data(), offset, tiles_ahead * job_.rows16.tile_step}, begin, count);
         for (int r = 0; r < plan_.rows; ++r) {
             int16_t* const to = scratch_.copied_rows() + size_t(r) * tile_samples;
-            std::fill(std::copy_n(job_.rows16.first[size_t(r)] + offset, count, to), to + (tile_samples - count),
-                      int16_t(0));
+            std::fill(std::copy_n(job_.rows16.first[size_t(r)] + offset, count, to), to + tile_samples, int16_t(0));
         }
         return invert_short({copies_.data(), 0, 0}, begin, count);
     }
@@ -394,8 +420,8 @@ class TileInverter {
             run_codelet(step.codelet, places + size_t(step.from) * tile_samples,
                         places + size_t(step.to) * tile_samples);
         if (!certify(plan_, places, sums)) return false;
-        const auto z = [&](size_t k) { return places + size_t(plan_.outputs[k - 1]) * tile_samples; };
-        store_lamps(job_, begin, count, z, tile.rows[plan_.extra_row] + tile.offset, sums.sums);
+        const auto z = [&](size_t k) -> const int16_t* { return places + size_t(plan_.outputs[k - 1]) * tile_samples; };
+        counts_.clipped += store_lamps(job_, begin, count, z, tile.rows[plan_.extra_row] + tile.offset, sums.sums);
         return true;
     }
 
@@ -422,10 +448,10 @@ class TileInverter {
         for (int r = 0; r < plan_.rows; ++r)
             for (size_t i = 0; i < tile_samples; ++i) sums[i] += places[size_t(r) * tile_samples + i];
         play(plan_.code, places);
-        const auto z = [&](size_t k) { return places + size_t(plan_.code.outputs[k - 1]) * tile_samples; };
-        for (size_t k = 1; !job_.shorts.empty() && k < size_t(plan_.order); ++k)
-            for (size_t i = 0; i < count; ++i) counts_.clipped += std::abs(z(k)[i]) > INT16_MAX;
-        store_lamps(job_, begin, count, z, places + size_t(plan_.extra_row) * tile_samples, sums);
+        const auto z = [&](size_t k) -> const int32_t* {
+            return places + size_t(plan_.code.outputs[k - 1]) * tile_samples;
+        };
+        counts_.clipped += store_lamps(job_, begin, count, z, places + size_t(plan_.extra_row) * tile_samples, sums);
     }
 
     const HadamardJob& job_;
