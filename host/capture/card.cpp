@@ -41,7 +41,10 @@ Sequence card_sequence(const StageConfig& stage, const CardOptions& options) {
     sequence.config.cycles = options.cycles;
     sequence.config.basis_exposure_us = exposure_for(stage, options);
     sequence.config.tracking_exposure_us = sequence.config.basis_exposure_us / 2;
-    sequence.basis = {"card", 1, int(lamps), std::vector<uint8_t>(lamps, 1), std::vector<int8_t>(lamps, 0), 1};
+    sequence.basis.name = "card";
+    sequence.basis.rows = 1;
+    sequence.basis.lamps = int(lamps);
+    sequence.basis.levels.assign(lamps, 1);
     constexpr SlotKind T = SlotKind::tracking, M = SlotKind::matte, B = SlotKind::basis, D = SlotKind::dark;
     for (const SlotKind kind : {T, M, B, D, B, B, D, D, B, D, D, D, B, B, B, D, D, B}) {
         Slot slot;

@@ -35,9 +35,10 @@ class CycleDeveloper {
         for (const auto& frame : row_frames_)
             if (frame) any_ = frame.get();
         assert(any_);
-        weight_sums_.resize(size_t(basis_.lamps));
+        weight_sums_.resize(size_t(basis_.images()));
         for (int row = 0; row < basis_.rows; ++row)
-            for (int lamp = 0; lamp < basis_.lamps; ++lamp) weight_sums_[size_t(lamp)] += basis_.weight(row, lamp);
+            for (int image = 0; image < basis_.images(); ++image)
+                weight_sums_[size_t(image)] += basis_.inverse(row, image);
     }
 
     Target develop() {
@@ -45,7 +46,7 @@ class CycleDeveloper {
         target_.height = int(any_->height);
         target_.cfa = any_->cfa;
         const size_t pixels = size_t(any_->width) * any_->height;
-        target_.lamps.assign(size_t(basis_.lamps * target_.planes()), std::vector<float>(pixels));
+        target_.lamps.assign(size_t(basis_.images() * target_.planes()), std::vector<float>(pixels));
         target_.mask.assign(pixels, 0);
         if (any_->format == PixelFormat::u16) target_.variance.assign(pixels, 0);
         for (int row = 0; row < basis_.rows; ++row)
@@ -137,15 +138,15 @@ class CycleDeveloper {
     template <typename Sum>
     void invert(const Band& band, const std::vector<std::vector<Sum>>& rows) {
         std::vector<float*> lamps;
-        for (int lamp = 0; lamp < basis_.lamps; ++lamp)
+        for (int lamp = 0; lamp < basis_.images(); ++lamp)
             lamps.push_back(
                 &target_.lamps[size_t(lamp * target_.planes() + band.channel)][band.first_row * any_->width]);
         const auto pointers = pointers_to(rows);
         demultiplex(basis_, std::span<const Sum* const>(pointers), band.samples, lamps, {.gain = gain_});
-        for (int lamp = 0; has_rest_ && lamp < basis_.lamps; ++lamp) {
-            const double scale = basis_.scale * weight_sums_[size_t(lamp)];
+        for (int lamp = 0; has_rest_ && lamp < basis_.images(); ++lamp) {
+            const double sum = weight_sums_[size_t(lamp)];
             float* out = lamps[size_t(lamp)];
-            for (size_t p = 0; p < band.samples; ++p) out[p] -= float(scale * black_rest_[p] * gain_[p]);
+            for (size_t p = 0; p < band.samples; ++p) out[p] -= float(sum * black_rest_[p] * gain_[p]);
         }
         for (const int lamp : target_.missing_lamps) std::fill_n(lamps[size_t(lamp)], band.samples, 0.0f);
     }
@@ -156,16 +157,17 @@ class CycleDeveloper {
     const NoiseModel& noise_;
     std::vector<std::shared_ptr<const Frame>> row_frames_;
     const Frame* any_ = nullptr;
-    std::vector<int> weight_sums_;  // of each lamp over all rows: what a constant in all rows becomes
+    std::vector<double> weight_sums_;  // of each image over all rows: what a constant in all rows becomes
     Target target_;
     std::vector<float> gain_, black_whole_, black_rest_;
     bool has_rest_ = false;
 };
 
-bool is_one_lamp_a_row(const Basis& basis) {
+// Whether each image rests on its own row alone, so that a missing slot takes one image with it.
+bool is_one_image_a_row(const Basis& basis) {
     for (int row = 0; row < basis.rows; ++row)
-        for (int lamp = 0; lamp < basis.lamps; ++lamp)
-            if (basis.lit(row, lamp) != (row == lamp)) return false;
+        for (int image = 0; image < basis.images(); ++image)
+            if ((basis.inverse(row, image) != 0) != (row == image)) return false;
     return true;
 }
 
@@ -182,7 +184,7 @@ Result<Target> develop_cycle(const CycleFrames& frames, const Sequence& sequence
                              const NoiseModel& noise) {
     const auto missing = missing_basis_slots(frames, sequence);
     if (int(missing.size()) == sequence.basis.rows) return fail("every basis slot of the cycle is missing");
-    if (!missing.empty() && !is_one_lamp_a_row(sequence.basis))
+    if (!missing.empty() && !is_one_image_a_row(sequence.basis))
         return fail(fmt::format("every lamp of basis {} rests on all rows, and these slots are missing: {}",
                                 sequence.basis.name, fmt::join(missing, ", ")));
     return CycleDeveloper(frames, sequence, calibration, noise).develop();

@@ -48,11 +48,11 @@ nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence
     return json;
 }
 
-// Noise variance of a lamp value over that of one row image, mean over lamps, for noise that does not depend on light.
+// Noise variance of a recovered image over that of one row image, mean over lamps, for noise that does not depend on light.
 double noise_gain(const Basis& basis) {
-    double squares = 0;
-    for (const int8_t weight : basis.weights) squares += double(weight) * weight;
-    return basis.scale * basis.scale * squares / basis.lamps;
+    double sum = 0;
+    for (int image = 0; image < basis.images(); ++image) sum += noise_variance(basis, image);
+    return sum / basis.images();
 }
 
 class TakeWriter {

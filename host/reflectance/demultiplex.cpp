@@ -23,29 +23,18 @@ namespace {
 constexpr size_t block_samples = 256;
 constexpr int lamps_at_once = 4;  // share each load of a row
 
-// The type that row samples are summed in, and a vector of those: one AVX2 register, two of SSE2. Tiles are aligned for
-// their elements only.
-template <typename Sample>
-struct Arithmetic;
-template <>
-struct Arithmetic<int32_t> {
-    using Sum = int32_t;
-    typedef int32_t Vector __attribute__((vector_size(32), aligned(4), may_alias));
+// A vector of what row samples are summed in: one AVX2 register, two of SSE2. Tiles are aligned for their elements only.
+template <typename Sum>
+struct Arithmetic {
+    typedef Sum Vector __attribute__((vector_size(32), aligned(sizeof(Sum)), may_alias));
 };
-template <>
-struct Arithmetic<float> {
-    using Sum = double;
-    typedef double Vector __attribute__((vector_size(32), aligned(8), may_alias));
-};
-template <typename Sample>
-using SumOf = typename Arithmetic<Sample>::Sum;
 
 // sums[lamp][p] of four lamps over one tile[row * block_samples + p]; weights[row * lamps_at_once + lamp].
-template <typename Sample>
-__attribute__((always_inline)) inline void sum_tile(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                                                    SumOf<Sample> (*sums)[block_samples]) {
-    using Vector = typename Arithmetic<Sample>::Vector;
-    for (size_t p = 0; p < block_samples; p += sizeof(Vector) / sizeof(SumOf<Sample>)) {
+template <typename Sum>
+__attribute__((always_inline)) inline void sum_tile(const Sum* tile, int rows, const Sum* weights,
+                                                    Sum (*sums)[block_samples]) {
+    using Vector = typename Arithmetic<Sum>::Vector;
+    for (size_t p = 0; p < block_samples; p += sizeof(Vector) / sizeof(Sum)) {
         // Four names instead of an array: the compiler keeps these in registers.
         Vector sum0{}, sum1{}, sum2{}, sum3{};
         for (int r = 0; r < rows; ++r) {
@@ -60,39 +49,38 @@ __attribute__((always_inline)) inline void sum_tile(const SumOf<Sample>* tile, i
     }
 }
 
-template <typename Sample>
-void sum_tile_portable(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                       SumOf<Sample> (*sums)[block_samples]) {
-    sum_tile<Sample>(tile, rows, weights, sums);
+template <typename Sum>
+void sum_tile_portable(const Sum* tile, int rows, const Sum* weights, Sum (*sums)[block_samples]) {
+    sum_tile<Sum>(tile, rows, weights, sums);
 }
 
 #if defined(__x86_64__)
-template <typename Sample>
-__attribute__((target("avx2"))) void sum_tile_avx2(const SumOf<Sample>* tile, int rows, const SumOf<Sample>* weights,
-                                                   SumOf<Sample> (*sums)[block_samples]) {
-    sum_tile<Sample>(tile, rows, weights, sums);
+template <typename Sum>
+__attribute__((target("avx2"))) void sum_tile_avx2(const Sum* tile, int rows, const Sum* weights,
+                                                   Sum (*sums)[block_samples]) {
+    sum_tile<Sum>(tile, rows, weights, sums);
 }
 #endif
 
 // Chosen at run time: shipped binaries are built for the baseline processor. Integer sums agree by nature; double sums
 // agree because each lane adds its rows in the same order and products are not fused.
-template <typename Sample>
+template <typename Sum>
 auto best_sum_tile() {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return sum_tile_avx2<Sample>;
+    if (__builtin_cpu_supports("avx2")) return sum_tile_avx2<Sum>;
 #endif
-    return sum_tile_portable<Sample>;
+    return sum_tile_portable<Sum>;
 }
 
 // Weights as the kernel reads them: [group of four lamps][row][lamp in group], zero beyond the last lamp.
 template <typename Sum>
 std::vector<Sum> grouped_weights(const Basis& basis) {
-    const int groups = (basis.lamps + lamps_at_once - 1) / lamps_at_once;
+    const int groups = (basis.images() + lamps_at_once - 1) / lamps_at_once;
     std::vector<Sum> weights(size_t(groups) * basis.rows * lamps_at_once);
     for (int r = 0; r < basis.rows; ++r)
-        for (int i = 0; i < basis.lamps; ++i)
+        for (int i = 0; i < basis.images(); ++i)
             weights[(size_t(i / lamps_at_once) * basis.rows + r) * lamps_at_once + i % lamps_at_once] =
-                Sum(basis.weight(r, i));
+                basis.has_integers() ? Sum(basis.weight(r, i)) : Sum(basis.inverse(r, i));
     return weights;
 }
 
@@ -113,8 +101,9 @@ void for_each_tile(size_t samples, int threads, const MakeWorker& make_worker) {
 }
 
 std::vector<float> sample_factors(const Basis& basis, size_t samples, const DemultiplexOptions& options) {
-    std::vector<float> factors(samples, float(basis.scale));
-    for (size_t p = 0; p < options.gain.size(); ++p) factors[p] = float(basis.scale * double(options.gain[p]));
+    const double scale = basis.has_integers() ? basis.scale : 1;
+    std::vector<float> factors(samples, float(scale));
+    for (size_t p = 0; p < options.gain.size(); ++p) factors[p] = float(scale * double(options.gain[p]));
     return factors;
 }
 
@@ -151,24 +140,23 @@ void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<
     });
 }
 
-template <typename Sample>
+template <typename Sum, typename Sample>
 void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
                          std::span<float* const> lamps, const DemultiplexOptions& options) {
-    using Sum = SumOf<Sample>;
-    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.lamps);
+    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
     assert(options.gain.empty() || options.gain.size() == samples);
     const auto weights = grouped_weights<Sum>(basis);
-    const auto kernel = best_sum_tile<Sample>();
+    const auto kernel = best_sum_tile<Sum>();
     const auto factors = sample_factors(basis, samples, options);
 
     const auto make_worker = [&] {
         return [&, tile = std::vector<Sum>(rows.size() * block_samples)](size_t begin, size_t count) mutable {
             for (size_t r = 0; r < rows.size(); ++r)
                 std::copy_n(rows[r] + begin, count, tile.data() + r * block_samples);
-            for (int first = 0; first < basis.lamps; first += lamps_at_once) {
+            for (int first = 0; first < basis.images(); first += lamps_at_once) {
                 Sum sums[lamps_at_once][block_samples];
                 kernel(tile.data(), basis.rows, weights.data() + size_t(first) * basis.rows, sums);
-                for (int k = 0; k < std::min(lamps_at_once, basis.lamps - first); ++k)
+                for (int k = 0; k < std::min(lamps_at_once, basis.images() - first); ++k)
                     for (size_t p = 0; p < count; ++p)
                         lamps[first + k][begin + p] = float(sums[k][p]) * factors[begin + p];
             }
@@ -181,16 +169,18 @@ void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows
 
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options) {
-    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.lamps);
+    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
     if (const auto made = plan_for(basis))
         demultiplex_by_plan(*made, basis, rows, samples, lamps, options);
-    else
+    else if (basis.has_integers())
         demultiplex_samples<int32_t>(basis, rows, samples, lamps, options);
+    else
+        demultiplex_samples<double>(basis, rows, samples, lamps, options);
 }
 
 void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
                  const DemultiplexOptions& options) {
-    demultiplex_samples<float>(basis, rows, samples, lamps, options);
+    demultiplex_samples<double>(basis, rows, samples, lamps, options);
 }
 
 void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out) {
@@ -204,14 +194,14 @@ void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows,
     std::vector<double> sums(samples);
     for (int r = 0; r < basis.rows; ++r) {
         double squares = 0;
-        for (int i = 0; i < basis.lamps; ++i) squares += double(basis.weight(r, i)) * basis.weight(r, i);
+        for (int i = 0; i < basis.images(); ++i) squares += basis.inverse(r, i) * basis.inverse(r, i);
         for (size_t p = 0; p < samples; ++p) {
             const double sigma = noise.read_counts + noise.shot * std::sqrt(double(std::max(rows[r][p], 0)));
-            sums[p] += squares / basis.lamps * sigma * sigma;
+            sums[p] += squares / basis.images() * sigma * sigma;
         }
     }
     for (size_t p = 0; p < samples; ++p) {
-        const double factor = basis.scale * (gain.empty() ? 1.0 : gain[p]);
+        const double factor = gain.empty() ? 1.0 : gain[p];
         out[p] = float(factor * factor * sums[p]);
     }
 }

@@ -20,9 +20,9 @@ struct DemultiplexOptions {
 };
 
 // lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
-// `rows` holds basis.rows pointers and `lamps` basis.lamps pointers, each to `samples` values. The sum is exact in int32
+// `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact in int32
 // when |counts| < 2^23: the weights of a lamp sum to at most 232 in magnitude (hadamard156, lamp 0), which suits every
-// camera of up to 16 bits.
+// camera of up to 16 bits. A basis without integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options = {});
 
@@ -37,7 +37,7 @@ void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32
 
 // The variance of a lamp value at each sample, mean over lamps, when the noise of row image y is
 // (read + shot sqrt(max(y, 0)))^2 and independent from row to row:
-// out[p] = (scale gain[p])^2 sum over rows of (mean over lamps of weight(row, i)^2) noise(rows[row][p])^2.
+// out[p] = gain[p]^2 sum over rows of (mean over images of inverse(row, i)^2) noise(rows[row][p])^2.
 void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                        const NoiseModel& noise, std::span<const float> gain, float* out);
 

@@ -97,7 +97,7 @@ HadamardPlan plan_s159(const Basis& basis) {
     for (const int even_part : parts.even) sum_of_all.push_back({even_part, -1});
     plan.add_output(plan.sum(sum_of_all));
     for (const int output : transform_paley(plan, v, parts)) plan.add_output(output);
-    for (int lamp = 0; lamp < basis.lamps; ++lamp) made.lamp_output.push_back(lamp);
+    for (int lamp = 0; lamp < basis.images(); ++lamp) made.lamp_output.push_back(lamp);
     made.plan = std::move(plan);
     made.order = 2 * half;
     return made;
@@ -143,7 +143,7 @@ HadamardPlan plan_hadamard156(const Basis& basis) {
         if (i > 0) terms.push_back({odd[size_t(b * half + nearest - 1)], i <= half ? sign : -sign});
         made.plan.add_output(made.plan.sum(terms));
     }
-    for (int lamp = 0; lamp < basis.lamps; ++lamp) made.lamp_output.push_back(lamp - 1);
+    for (int lamp = 0; lamp < basis.images(); ++lamp) made.lamp_output.push_back(lamp - 1);
     made.extra_weight = -made.order / 2;  // to the weight of row 0 for lamp 0
     return made;
 }
@@ -151,7 +151,7 @@ HadamardPlan plan_hadamard156(const Basis& basis) {
 // What the plan computes is what the basis asks for.
 bool matches(const HadamardPlan& made, const Basis& basis) {
     const auto outputs = made.plan.matrix();
-    for (int lamp = 0; lamp < basis.lamps; ++lamp)
+    for (int lamp = 0; lamp < basis.images(); ++lamp)
         for (int row = 0; row < basis.rows; ++row) {
             const int output = made.lamp_output[size_t(lamp)];
             const int weight = output >= 0 ? outputs[size_t(output)][size_t(row)]

@@ -165,6 +165,12 @@ Result<std::vector<LightPosition>> read_lp(const std::string& path) {
     return lights;
 }
 
+std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions) {
+    std::vector<LightPosition> lamps;
+    for (size_t i = 0; i < directions.size(); ++i) lamps.push_back({fmt::format("lamp_{:03}", i), directions[i]});
+    return lamps;
+}
+
 Status write_lp(const std::string& path, std::vector<LightPosition> lights) {
     std::sort(lights.begin(), lights.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
     std::string text = fmt::format("{}\n", lights.size());

@@ -38,6 +38,9 @@ struct LightPosition {
     Vec3 direction;  // unit length
 };
 
+// Directions named lamp_000 and so on; without any, those of stage_lamp_directions().
+std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions = stage_lamp_directions());
+
 // Reads an .lp file: the count, then `name x y z` a line. Names may hold spaces; decimal commas are understood;
 // directions are normalised. A wrong count, a zero vector or a line that is no light is an error that names file and
 // line.

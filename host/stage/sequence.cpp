@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -104,6 +105,11 @@ class CycleLayout {
         Slot slot = unlit(SlotKind::basis, config_.basis_exposure_us);
         slot.row = row;
         for (int lamp = 0; lamp < basis_.lamps; ++lamp) slot.lit[size_t(lamp)] = basis_.lit(row, lamp);
+        if (basis_.level_max == 1) return slot;
+        slot.planes = uint8_t(std::bit_width(unsigned(basis_.level_max)));
+        slot.exposure_ticks = grey_exposure_ticks(config_.basis_exposure_us, slot.planes);
+        slot.levels.assign(lamps_, 0);
+        for (int lamp = 0; lamp < basis_.lamps; ++lamp) slot.levels[size_t(lamp)] = uint8_t(basis_.level(row, lamp));
         return slot;
     }
 
@@ -204,18 +210,16 @@ Result<SequenceConfig> read_sequence(const std::string& path) {
     if (const Status status = file->finish(); !status.ok()) return status.error();
     if (!config.listed_slots.empty()) return config;
     if (config.basis != harmonics_name)
-        if (const auto basis = find_basis(config.basis); !basis.ok())
-            return fail(path + ": " + basis.error().message + ", " + harmonics_name);
+        if (const Status status = check_basis_name(config.basis); !status.ok())
+            return fail(path + ": " + status.error().message + ", " + harmonics_name);
+    if (config.basis.ends_with(".csv")) config.basis = file->resolve_path(config.basis);
     if (const Status status = check_exposures(config); !status.ok()) return fail(path + ": " + status.error().message);
     return config;
 }
 
 static Result<Sequence> compile_capture(const SequenceConfig& config, const StageConfig& stage) {
-    auto basis = find_basis(config.basis);
+    auto basis = find_basis(config.basis, stage.lamps);
     if (!basis.ok()) return basis.error();
-    if (basis->lamps != int(stage.lamps.size()))
-        return fail(fmt::format("basis {} is for {} lamps and the stage has {} on its sphere: choose another basis",
-                                config.basis, basis->lamps, stage.lamps.size()));
     for (const int lamp : config.tracking_lamps)
         if (lamp >= stage.lamp_count())
             return fail(fmt::format("tracking_lamps names lamp {}, and the stage has {}", lamp, stage.lamp_count()));

@@ -13,12 +13,6 @@ namespace ols {
 
 namespace {
 
-std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions) {
-    std::vector<LightPosition> lamps;
-    for (size_t i = 0; i < directions.size(); ++i) lamps.push_back({fmt::format("lamp_{:03}", i), directions[i]});
-    return lamps;
-}
-
 // Six lamps on arms in front of the 60 x 40 cm matte board, which hangs half a metre behind the subject (Wenger 3.2):
 // three above and three below the camera's view, turned towards the board.
 std::vector<Vec3> default_matte_lamps() {
@@ -112,7 +106,7 @@ CameraConfig read_camera(TomlSection& camera) {
 
 StageConfig default_stage() {
     StageConfig stage;
-    stage.lamps = named_lamps(stage_lamp_directions());
+    stage.lamps = named_lamps();
     stage.matte_lamps_m = default_matte_lamps();
     stage.chain_bit_of_lamp = identity_chain(stage.lamp_count());
     stage.cameras.emplace_back();

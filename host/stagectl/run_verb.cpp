@@ -35,7 +35,7 @@ TakeInfo describe_take(const Options& options, const Sequence& sequence, const S
     info.frame_rate_hz = double(tick_hz) / double(sequence.cycle_ticks());
     info.basis = sequence.basis.name;
     info.value_unit = "reflectance";
-    info.lights = stage.lamps;
+    info.lights = image_lights(sequence.basis, stage.lamps);
     info.sample_type = options.single_float ? SampleType::single_float : SampleType::half_float;
     return info;
 }

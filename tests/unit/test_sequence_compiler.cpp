@@ -160,6 +160,7 @@ TEST(SequenceCompiler, what_cannot_be_played_is_refused_with_a_remedy) {
     config.tracking_lamps = {5, 162};
     EXPECT_NE(compile_sequence(config, stage).error().message.find("lamp 162"), std::string::npos);
     config = {};
+    config.basis = "hadamard156";
     stage.lamps.resize(20);
     EXPECT_NE(compile_sequence(config, stage).error().message.find("156 lamps"), std::string::npos);
     EXPECT_NE(error_of_file("basis = \"none\"\n").find("none"), std::string::npos);

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// Reading and writing of levels as text.
+#include "stage/basis_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "stage/basis_inverse.hpp"
+
+namespace ols {
+
+namespace {
+
+constexpr int level_limit = 255;
+
+struct Lines {
+    std::string path;
+    int number = 0;
+
+    Error error(const std::string& what) const { return fail(fmt::format("{}:{}: {}", path, number, what)); }
+};
+
+std::optional<int> whole_number(const std::string& word) {
+    int value = 0;
+    const auto parsed = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (parsed.ec != std::errc() || parsed.ptr != word.data() + word.size()) return std::nullopt;
+    return value;
+}
+
+std::vector<std::string> words_of(std::string line) {
+    std::replace_if(
+        line.begin(), line.end(), [](char c) { return c == ',' || c == ';' || c == '=' || c == '\r'; }, ' ');
+    std::istringstream stream(line);
+    std::vector<std::string> words;
+    for (std::string word; stream >> word;) words.push_back(word);
+    return words;
+}
+
+// `# level_max = N`; other comments say nothing.
+Status read_comment(const Lines& at, const std::string& line, int& level_max) {
+    const auto words = words_of(line.substr(1));
+    if (words.size() != 2 || words[0] != "level_max") return Done{};
+    const auto value = whole_number(words[1]);
+    if (!value || *value < 1 || *value > level_limit || (*value & (*value + 1)) != 0)
+        return at.error(fmt::format("level_max '{}' is none of 1, 3, 7 ... 255", words[1]));
+    level_max = *value;
+    return Done{};
+}
+
+Status read_row(const Lines& at, const std::vector<std::string>& words, Basis& basis) {
+    if (int(words.size()) != basis.lamps)
+        return at.error(fmt::format("{} levels where the stage has {} lamps on its sphere", words.size(), basis.lamps));
+    for (const auto& word : words) {
+        const auto value = whole_number(word);
+        if (!value || *value < 0 || *value > level_limit)
+            return at.error(fmt::format("'{}' is no level: give whole numbers from 0 to {}", word, level_limit));
+        basis.levels.push_back(uint8_t(*value));
+    }
+    basis.rows++;
+    return Done{};
+}
+
+}  // namespace
+
+Result<Basis> read_basis(const std::string& path, int lamps) {
+    std::ifstream file(path);
+    if (!file) return fail("cannot read the basis file '" + path + "': check that it exists");
+    Basis basis;
+    basis.name = std::filesystem::path(path).stem().string();
+    basis.lamps = lamps;
+    int stated_max = 0;
+    Lines at{path};
+    for (std::string line; std::getline(file, line);) {
+        at.number++;
+        if (line.starts_with('#')) {
+            if (const Status status = read_comment(at, line, stated_max); !status.ok()) return status.error();
+            continue;
+        }
+        const auto words = words_of(line);
+        if (words.empty()) continue;
+        if (const Status status = read_row(at, words, basis); !status.ok()) return status.error();
+    }
+    if (basis.rows == 0) return fail(path + ": no rows of levels in it");
+    const int highest = *std::max_element(basis.levels.begin(), basis.levels.end());
+    basis.level_max = stated_max ? stated_max : highest > 1 ? level_limit : 1;
+    if (highest > basis.level_max)
+        return fail(fmt::format("{}: level {} is above its level_max of {}", path, highest, basis.level_max));
+    auto inverted = with_least_squares(std::move(basis));
+    if (!inverted.ok()) return fail(path + ": " + inverted.error().message);
+    return inverted;
+}
+
+Status write_basis(const std::string& path, const Basis& basis, const std::string& comment) {
+    std::string text;
+    std::istringstream lines(comment);
+    for (std::string line; std::getline(lines, line);) text += "# " + line + "\n";
+    text += fmt::format("# level_max = {}\n", basis.level_max);
+    for (int r = 0; r < basis.rows; ++r)
+        for (int lamp = 0; lamp < basis.lamps; ++lamp)
+            text += fmt::format("{}{}", basis.level(r, lamp), lamp + 1 < basis.lamps ? "," : "\n");
+    const std::string temporary = path + ".part";
+    std::ofstream file(temporary, std::ios::binary);
+    file << text;
+    file.close();
+    std::error_code error;
+    if (file) std::filesystem::rename(temporary, path, error);
+    if (!file || error) {
+        std::error_code ignored;
+        std::filesystem::remove(temporary, ignored);
+        return fail("cannot write '" + path + "': check that the folder exists and has space");
+    }
+    return Done{};
+}
+
+}  // namespace ols
