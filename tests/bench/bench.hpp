@@ -45,7 +45,7 @@ struct Knob {
     std::string default_setting;  // by name
     // Where the default is on no Pareto front of error and time (another setting is better in one and no worse in the
     // other): why it is the default nevertheless. Else empty.
-    std::string why_off_front;
+    std::string why_off_front = "";
     std::vector<Setting> settings;
 };
 

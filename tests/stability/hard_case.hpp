@@ -29,14 +29,14 @@ inline void record_case(const std::string& name, const std::string& naive, const
     testing::Test::RecordProperty("bound", bound);
 }
 
-// "0.00012 counts", "Inf", "0".
+// "0.00012 counts", "Inf", "0"; without a unit, the number alone.
 inline std::string with_unit(double value, const std::string& unit) {
     if (std::isnan(value)) return "NaN";
     if (std::isinf(value)) return value > 0 ? "Inf" : "-Inf";
     if (value == 0) return "0";
     char text[32];
     std::snprintf(text, sizeof text, "%.2g", value);
-    return text + (" " + unit);
+    return unit.empty() ? text : text + (" " + unit);
 }
 
 // Errors (or what else should be small) of the two methods. Ours keeps the bound, and the naive one does not: else the
