@@ -11,6 +11,7 @@ namespace {
 constexpr size_t at_once = 32;
 constexpr int group_rows = 8, table_sums = 1 << group_rows;
 typedef int16_t Sums __attribute__((vector_size(at_once * sizeof(int16_t)), aligned(sizeof(int16_t)), may_alias));
+typedef float Floats __attribute__((vector_size(at_once * sizeof(float)), aligned(sizeof(float)), may_alias));
 
 // table[bits]: the sum of the group's rows, minus where the bit is set.
 __attribute__((always_inline)) inline void fill_table(const Sums* rows, int count, Sums* table) {
@@ -37,7 +38,7 @@ void invert_samples(std::span<int16_t* const> rows, size_t begin, const std::vec
         for (size_t i = 0; i < lamps.size(); ++i) sums[i] += table[*pattern++];
     }
     for (size_t i = 0; i < lamps.size(); ++i)
-        for (size_t k = 0; k < at_once; ++k) lamps[i][begin + k] = float(values[i * at_once + k]) * scale;
+        *reinterpret_cast<Floats*>(lamps[i] + begin) = __builtin_convertvector(sums[i], Floats) * scale;
 }
 
 }  // namespace
