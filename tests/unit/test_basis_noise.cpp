@@ -41,7 +41,7 @@ TEST(BasisNoise, s159_averages_its_rows_noise) {
     }
 }
 
-// Standard deviations add, sigma = 2.68 + 0.492 sqrt(mu), and the inversion leaves 4 k / (k + 1)^2 of the variance
+// Standard deviations add, sigma = 2.68 + 0.492 sqrt(mu), and the inversion leaves 4 k / (k + 1)^2 of the variance.
 TEST(BasisNoise, hadamard_gains_2_4_at_2_counts_a_lamp_1_6_at_10_and_1_15_at_50) {
     EXPECT_NEAR(gain_over_single("hadamard156", 2), 2.4, 0.05);
     EXPECT_NEAR(gain_over_single("hadamard156", 10), 1.6, 0.05);
