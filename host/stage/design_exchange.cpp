@@ -40,7 +40,7 @@ class Exchange {
             constexpr int changes_max = 4;  // then other rows have their turn
             for (int count = 0; count < changes_max; ++count) {
                 const Change change = best_change();
-                if (change.cost_change >= -1e-9 * cost_.cost) break;
+                if (change.i < 0) break;
                 apply(change);
                 changed = true;
             }
@@ -146,6 +146,7 @@ class Exchange {
 
     Change best_change() const {
         Change best;
+        best.cost_change = -1e-9 * cost_.cost;  // less is rounding
         for (Index i = 0; i < light_.cols(); ++i) {
             const double level = light_(row_, i);
             if (level_max_ == 1) {
