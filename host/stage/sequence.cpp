@@ -8,10 +8,9 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <numbers>
-#include <numeric>
 
 #include "stage/pattern_slots.hpp"
+#include "stage/slot_order.hpp"
 #include "stage/toml_section.hpp"
 
 namespace ols {
@@ -43,14 +42,6 @@ std::vector<bool> choose_dark_places(int groups, int places, int dark_count) {
     return dark;
 }
 
-int stride_of(int rows) {
-    const double ideal = rows / std::numbers::phi;
-    int best = 1;
-    for (int q = 1; q < rows; ++q)
-        if (std::gcd(q, rows) == 1 && std::abs(q - ideal) < std::abs(best - ideal)) best = q;
-    return best;
-}
-
 // Makes the slots of one sequence; lamps and triggers are the same for all slots of a kind but basis.
 class CycleLayout {
   public:
@@ -63,19 +54,18 @@ class CycleLayout {
         const int places = config_.group_slots - landmarks_a_group;
         const int groups = basis_.rows / places + 1;
         const auto dark = choose_dark_places(groups, places, groups * places - basis_.rows);
-        const int stride = stride_of(basis_.rows);
         std::vector<Slot> cycle;
-        int64_t basis_place = 0;
+        std::vector<int> basis_places;
         for (int place = 0; place < groups * places; ++place) {
             if (place % places == 0) {
                 cycle.push_back(tracking());
                 cycle.push_back(matte());
             }
-            if (dark[place])
-                cycle.push_back(unlit(SlotKind::dark, config_.basis_exposure_us));
-            else
-                cycle.push_back(basis_row(int(basis_place++ * stride % basis_.rows)));
+            if (!dark[size_t(place)]) basis_places.push_back(int(cycle.size()));
+            cycle.push_back(unlit(SlotKind::dark, config_.basis_exposure_us));
         }
+        const auto order = spread_rows(basis_, basis_places, int(cycle.size()));
+        for (size_t n = 0; n < order.size(); ++n) cycle[size_t(basis_places[n])] = basis_row(order[n]);
         return cycle;
     }
 

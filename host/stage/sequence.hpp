@@ -84,9 +84,7 @@ struct Sequence {
 Result<SequenceConfig> read_sequence(const std::string& path);
 
 // Lays out the cycle: groups of tracking, matte and basis places, as many as hold every row of the basis and at least
-// one dark slot. Row p * q mod rows stands at basis place p, where q, coprime to the rows, is nearest to rows / golden
-// ratio: rows that follow each other are far apart in the basis, so that neighbouring lamps do not light in turn and
-// a lamp's on-times do not cluster. Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
+// one dark slot. Rows stand where each lamp's light spreads evenly over the cycle (stage/slot_order.hpp). Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
 // place of its own: no two dark slots have the same distance to their group's tracking slot, so that each of them
 // alone tells where in the cycle it is.
 // Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;
