@@ -155,6 +155,7 @@ void Bench::measure(const Knob& knob) {
                     {"ms_median", timings[i].ms_median},
                     {"ratio_to_peer", timings[i].ratio_to_peer},
                     {"threads", setting.threads},
+                    {"rounds", rounds_},
                     {"bytes", bytes[i] ? Json(*bytes[i]) : Json()}});
     }
 }

@@ -15,7 +15,7 @@ KNOB = {"subject": "inversion", "knob": "method", "set_by": "`--method`", "error
 
 def row(setting, ms, error, **other):
     return {"knob": "method", "setting": setting, "default": setting == "fast", "peer": "plain", "error": error, "error_unit": "counts",
-            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "bytes": 2_000_000, **other}
+            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "rounds": 15, "bytes": 2_000_000, **other}
 
 
 ROWS = [row("plain", 20.0, 0.0), row("fast", 2.0, 0.125), row("wrong", 3.0, None)]
