@@ -125,6 +125,7 @@ void Bench::measure(const Knob& knob) {
                     {"peer", knob.peer},
                     {"default", knob.default_setting},
                     {"why_off_front", knob.why_off_front},
+                    {"differs_by_machine", knob.differs_by_machine},
                     {"settings", names}});
         return;
     }

@@ -47,6 +47,7 @@ struct Knob {
     // other): why it is the default nevertheless. Else empty.
     std::string why_off_front = "";
     std::vector<Setting> settings;
+    bool differs_by_machine = false;  // settings and default are those of the processor at hand
 };
 
 struct Subject {

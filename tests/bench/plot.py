@@ -12,6 +12,7 @@ import page  # noqa: E402
 import pareto  # noqa: E402
 
 COLUMNS = 2
+NEAR_X, NEAR_Y = 26, 12  # pixels
 BLUE, GREY, RED = "#1f5fa8", "#666666", "#c0392b"
 
 
@@ -21,6 +22,20 @@ def floor_of(rows):
     if not errors:
         return 1.0
     return 10 ** (math.floor(math.log10(min(errors))) - 1) if len(errors) < len(rows) else min(errors) / 2
+
+
+def clusters(pixels):
+    """Numbers of points too near each other for a label each, the leftmost point first."""
+    found = []
+    for number in sorted(pixels, key=lambda number: pixels[number][0]):
+        x, y = pixels[number]
+        for cluster in found:
+            if any(abs(x - pixels[other][0]) < NEAR_X and abs(y - pixels[other][1]) < NEAR_Y for other in cluster):
+                cluster.append(number)
+                break
+        else:
+            found.append([number])
+    return found
 
 
 def draw_panel(axes, title, rows):
@@ -37,10 +52,11 @@ def draw_panel(axes, title, rows):
         axes.plot(*place, "s" if row["setting"] == row["peer"] else "o", markersize=6, color=BLUE if row in front else GREY, label=label, zorder=2)
         if row["default"]:
             axes.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor=RED, markeredgewidth=1.5, zorder=3)
-        # The front's line comes from above and leaves to the right. Numbers of neighbours in time stand at different heights.
-        order = sorted(finite, key=lambda other: other["ms_median"]).index(row)
-        axes.annotate(str(number), place, xytext=(-8, (7, -13)[order % 2]), textcoords="offset points", ha="right", fontsize=8)
     frame_panel(axes, title, finite, floor)
+    places = {number: (row["ms_median"], height[row["setting"]]) for number, row in enumerate(rows, 1) if row["error"] is not None}
+    for numbers in clusters({number: axes.transData.transform(place) for number, place in places.items()}):
+        # The front's line comes from above and leaves to the right.
+        axes.annotate(", ".join(map(str, numbers)), places[numbers[0]], xytext=(-8, 7), textcoords="offset points", ha="right", fontsize=8)
 
 
 def frame_panel(axes, title, rows, floor):

@@ -10,7 +10,7 @@ import pytest
 
 SUBJECT = {"subject": "inversion", "truth": "Exact sums.", "advice": "Take the default."}
 KNOB = {"subject": "inversion", "knob": "method", "set_by": "`--method`", "error_unit": "counts", "peer": "plain", "default": "fast",
-        "why_off_front": "", "settings": ["plain", "fast"]}
+        "why_off_front": "", "differs_by_machine": False, "settings": ["plain", "fast"]}
 
 
 def row(setting, ms, error, **other):
@@ -61,6 +61,7 @@ def test_a_knob_that_the_page_lacks_and_a_changed_default_are_found():
     assert page.missing([(SUBJECT, [KNOB])], text) == []
     assert "'threads'" in page.missing([(SUBJECT, [KNOB, {**KNOB, "knob": "threads"}])], text)[0]
     assert "'plain'" in page.missing([(SUBJECT, [{**KNOB, "default": "plain"}])], text)[0]
+    assert page.missing([(SUBJECT, [{**KNOB, "default": "avx512", "differs_by_machine": True}])], text) == []
     assert "'method' of masks" in page.missing([({**SUBJECT, "subject": "masks"}, [KNOB])], text)[0]
 
 
