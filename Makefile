@@ -5,8 +5,8 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit stability bench hil fuzz-smoke fuzz mutation lint \
-        lint-fast format flash install clean
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke hil fuzz-smoke \
+        fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
 
@@ -33,7 +33,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability fuzz-smoke hil ## everything that needs no hardware
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
@@ -44,6 +44,16 @@ unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 stability: checked ## the hard cases: naive method, ours, derived bound (docs/stability.md)
 	@$(PYTHON) tests/stability/table.py --check
 	@$(PYTHON) -m pytest -q tests/stability
+
+benchmarks: setup
+	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
+	@ninja -C $(HOST) --quiet benchmarks
+
+bench: benchmarks ## what accuracy costs (SUBJECT=name for one subject): out/bench, docs/accuracy.md
+	@$(PYTHON) tests/bench/bench.py $(if $(SUBJECT),--subject $(SUBJECT))
+
+bench-smoke: benchmarks ## every benchmark once at tiny sizes, and the tests of their page
+	@$(PYTHON) -m pytest -q tests/bench
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture

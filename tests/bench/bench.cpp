@@ -125,6 +125,7 @@ void Bench::measure(const Knob& knob) {
                     {"peer", knob.peer},
                     {"default", knob.default_setting},
                     {"why_off_front", knob.why_off_front},
+                    {"differs_by_machine", knob.differs_by_machine},
                     {"settings", names}});
         return;
     }
@@ -155,6 +156,7 @@ void Bench::measure(const Knob& knob) {
                     {"ms_median", timings[i].ms_median},
                     {"ratio_to_peer", timings[i].ratio_to_peer},
                     {"threads", setting.threads},
+                    {"rounds", rounds_},
                     {"bytes", bytes[i] ? Json(*bytes[i]) : Json()}});
     }
 }

@@ -14,7 +14,7 @@
 //     }
 //
 //     bench_inversion           measures; a line a setting: subject, knob, setting, default, peer, error, error_unit,
-//                               ms_median, ratio_to_peer, threads, bytes
+//                               ms_median, ratio_to_peer, threads, rounds, bytes
 //     bench_inversion --list    the registry: a line for the subject and one for each knob, nothing measured
 //     bench_inversion --smoke   every setting twice at tiny sizes, so that tests see that the program works
 //     --rounds N                instead of 15
@@ -47,6 +47,7 @@ struct Knob {
     // other): why it is the default nevertheless. Else empty.
     std::string why_off_front = "";
     std::vector<Setting> settings;
+    bool differs_by_machine = false;  // settings and default are those of the processor at hand
 };
 
 struct Subject {

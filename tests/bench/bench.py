@@ -19,7 +19,7 @@ import page
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build/host/bin"
 RESULTS = ROOT / "out/bench"
-ROW_KEYS = ("knob", "setting", "default", "peer", "error", "error_unit", "ms_median", "ratio_to_peer", "threads", "bytes")
+ROW_KEYS = ("knob", "setting", "default", "peer", "error", "error_unit", "ms_median", "ratio_to_peer", "threads", "rounds", "bytes")
 
 
 def subjects():
@@ -53,8 +53,8 @@ def machine():
     return f"one machine with {len(set(Path('/sys/devices/system/cpu').glob('cpu[0-9]*')))} cores of {model}"
 
 
-def measure(subject):
-    rows = [{key: line[key] for key in ROW_KEYS} for line in lines_of(subject)]
+def measure(subject, rounds):
+    rows = [{key: line[key] for key in ROW_KEYS} for line in lines_of(subject, "--rounds", str(rounds))]
     RESULTS.mkdir(parents=True, exist_ok=True)
     (RESULTS / f"{subject}.json").write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
     (RESULTS / "machine.txt").write_text(machine() + "\n")
@@ -89,6 +89,7 @@ def smoke():
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--subject", choices=subjects())
+    parser.add_argument("--rounds", type=int, default=15, metavar="N", help="times that each setting runs (default: %(default)s)")
     parser.add_argument("--smoke", action="store_true")
     parser.add_argument("--docs", action="store_true")
     options = parser.parse_args()
@@ -98,7 +99,7 @@ def main():
     for subject, knobs in registry:
         if not options.docs and options.subject in (None, subject["subject"]):
             print(f"bench: {subject['subject']}", flush=True)
-            rows = measure(subject["subject"])
+            rows = measure(subject["subject"], options.rounds)
             print(page.section(subject, knobs, rows))
     sys.exit(write_docs(registry))
 

@@ -208,6 +208,8 @@ void measure_methods(Bench& bench, Inversion& work) {
          .error_unit = "counts, largest",
          .peer = "OpenBLAS sgemm",
          .default_setting = "structured int16",
+         .why_off_front =
+             "frames come as images and the chain reads floats; tiles and shorts are for who can use them.",
          .settings = {work.product("OpenBLAS sgemm", &Inversion::by_openblas),
                       work.product("Eigen sgemm", &Inversion::by_eigen), work.four_russians(), work.any_basis(),
                       work.structured("structured int32", Rows::wide, work.floats(), false),
@@ -221,7 +223,7 @@ void measure_storage(Bench& bench, Inversion& work) {
                    .error_unit = "counts, largest",
                    .peer = "OpenBLAS sgemm",
                    .default_setting = "images to floats",
-                   .why_off_front = "floats in images are what the rest of the chain reads",
+                   .why_off_front = "floats in images are what the rest of the chain reads.",
                    .settings = {work.product("OpenBLAS sgemm", &Inversion::by_openblas),
                                 work.structured("images to floats", Rows::plain, work.floats(), false),
                                 work.structured("images to halves", Rows::plain, work.halves(), false),
@@ -245,11 +247,12 @@ void measure_paths(Bench& bench, Inversion& work) {
         settings.push_back(setting);
     }
     bench.measure({.name = "SIMD path",
-                   .set_by = "the processor",
+                   .set_by = "the processor (by Highway's names: AVX3 is AVX-512)",
                    .error_unit = "counts, largest",
                    .peer = settings.back().name,
                    .default_setting = settings.front().name,
-                   .settings = settings});
+                   .settings = settings,
+                   .differs_by_machine = true});
 }
 
 void measure_bases(Bench& bench, Inversion& s159, Inversion& hadamard156) {

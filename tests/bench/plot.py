@@ -12,13 +12,30 @@ import page  # noqa: E402
 import pareto  # noqa: E402
 
 COLUMNS = 2
+NEAR_X, NEAR_Y = 26, 12  # pixels
 BLUE, GREY, RED = "#1f5fa8", "#666666", "#c0392b"
 
 
 def floor_of(rows):
-    """Where exact results are drawn, and from where on the axis is logarithmic: a decade below the least error."""
+    """The bottom line: where exact results are drawn, a decade below the least error; else a little below it."""
     errors = [row["error"] for row in rows if row["error"]]
-    return 10 ** (math.floor(math.log10(min(errors))) - 1) if errors else 1.0
+    if not errors:
+        return 1.0
+    return 10 ** (math.floor(math.log10(min(errors))) - 1) if len(errors) < len(rows) else min(errors) / 2
+
+
+def clusters(pixels):
+    """Numbers of points too near each other for a label each, the leftmost point first."""
+    found = []
+    for number in sorted(pixels, key=lambda number: pixels[number][0]):
+        x, y = pixels[number]
+        for cluster in found:
+            if any(abs(x - pixels[other][0]) < NEAR_X and abs(y - pixels[other][1]) < NEAR_Y for other in cluster):
+                cluster.append(number)
+                break
+        else:
+            found.append([number])
+    return found
 
 
 def draw_panel(axes, title, rows):
@@ -35,10 +52,11 @@ def draw_panel(axes, title, rows):
         axes.plot(*place, "s" if row["setting"] == row["peer"] else "o", markersize=6, color=BLUE if row in front else GREY, label=label, zorder=2)
         if row["default"]:
             axes.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor=RED, markeredgewidth=1.5, zorder=3)
-        # Numbers of neighbours in time stand at different heights.
-        order = sorted(finite, key=lambda other: other["ms_median"]).index(row)
-        axes.annotate(str(number), place, xytext=(0, 10 + 9 * (order % 2)), textcoords="offset points", ha="center", fontsize=8)
     frame_panel(axes, title, finite, floor)
+    places = {number: (row["ms_median"], height[row["setting"]]) for number, row in enumerate(rows, 1) if row["error"] is not None}
+    for numbers in clusters({number: axes.transData.transform(place) for number, place in places.items()}):
+        # The front's line comes from above and leaves to the right.
+        axes.annotate(", ".join(map(str, numbers)), places[numbers[0]], xytext=(-8, 7), textcoords="offset points", ha="right", fontsize=8)
 
 
 def frame_panel(axes, title, rows, floor):
@@ -47,21 +65,21 @@ def frame_panel(axes, title, rows, floor):
     axes.set_yscale("log")
     times = [row["ms_median"] for row in rows]
     axes.set_xlim(min(times) / 1.8, max(times) * 1.8)
-    highest = max([row["error"] for row in rows] + [floor])
-    axes.set_ylim(floor / 2, highest * (10 if highest > floor else 1000))
+    highest = max([row["error"] for row in rows] + [10 * floor])
+    axes.set_ylim(floor / 2, highest * 4)
     axes.set_xlabel("time, ms", fontsize=8)
     axes.set_ylabel(f"error, {rows[0]['error_unit']}", fontsize=8)
     axes.tick_params(labelsize=8)
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.grid(alpha=0.25)
     if any(row["error"] == 0 for row in rows):
-        ticks = [tick for tick in axes.get_yticks() if floor < tick <= highest * 10]
+        ticks = [tick for tick in axes.get_yticks() if floor < tick <= highest * 4]
         axes.set_yticks([floor] + ticks[:: max(1, len(ticks) // 5)])
         axes.yaxis.set_major_formatter(lambda value, _: "exact" if value == floor else f"$10^{{{round(math.log10(value))}}}$")
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_ylim(floor / 2, highest * (10 if highest > floor else 1000))
+        axes.set_ylim(floor / 2, highest * 4)
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.01, 1.02), handlelength=1, frameon=False, borderaxespad=0)
 
 

@@ -10,12 +10,12 @@ import pytest
 
 SUBJECT = {"subject": "inversion", "truth": "Exact sums.", "advice": "Take the default."}
 KNOB = {"subject": "inversion", "knob": "method", "set_by": "`--method`", "error_unit": "counts", "peer": "plain", "default": "fast",
-        "why_off_front": "", "settings": ["plain", "fast"]}
+        "why_off_front": "", "differs_by_machine": False, "settings": ["plain", "fast"]}
 
 
 def row(setting, ms, error, **other):
     return {"knob": "method", "setting": setting, "default": setting == "fast", "peer": "plain", "error": error, "error_unit": "counts",
-            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "bytes": 2_000_000, **other}
+            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "rounds": 15, "bytes": 2_000_000, **other}
 
 
 ROWS = [row("plain", 20.0, 0.0), row("fast", 2.0, 0.125), row("wrong", 3.0, None)]
@@ -61,6 +61,7 @@ def test_a_knob_that_the_page_lacks_and_a_changed_default_are_found():
     assert page.missing([(SUBJECT, [KNOB])], text) == []
     assert "'threads'" in page.missing([(SUBJECT, [KNOB, {**KNOB, "knob": "threads"}])], text)[0]
     assert "'plain'" in page.missing([(SUBJECT, [{**KNOB, "default": "plain"}])], text)[0]
+    assert page.missing([(SUBJECT, [{**KNOB, "default": "avx512", "differs_by_machine": True}])], text) == []
     assert "'method' of masks" in page.missing([({**SUBJECT, "subject": "masks"}, [KNOB])], text)[0]
 
 
