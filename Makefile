@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit hil fuzz-smoke fuzz mutation lint lint-fast \
+.PHONY: all help setup firmware host checked assets demo test unit noise hil fuzz-smoke fuzz mutation lint lint-fast \
         format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -40,6 +40,10 @@ unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@ctest --test-dir $(CHECKED) --output-on-failure -j2 --no-tests=error
 	@$(PYTHON) -m pytest -q tests/unit tests/oracle
 	@cd tools/stagesim/board && npm test --silent
+
+noise: all ## Wenger's SNR comparison on the virtual stage, and what designed bases gain: out/bench, docs/bases.md
+	@$(PYTHON) tests/bench/snr.py --out out/bench --page docs/bases.md
+	@$(PYTHON) tests/bench/basis_gain.py --out out/bench --plot docs/images/basis_gain.png --page docs/bases.md
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
