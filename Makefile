@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke hil fuzz-smoke \
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -54,6 +54,10 @@ bench: benchmarks ## what accuracy costs (SUBJECT=name for one subject): out/ben
 
 bench-smoke: benchmarks ## every benchmark once at tiny sizes, and the tests of their page
 	@$(PYTHON) -m pytest -q tests/bench
+
+noise: all ## Wenger's SNR comparison on the virtual stage, and what designed bases gain: out/bench, docs/bases.md
+	@$(PYTHON) tests/bench/snr.py --out out/bench --page docs/bases.md
+	@$(PYTHON) tests/bench/basis_gain.py --out out/bench --plot docs/images/basis_gain.png --page docs/bases.md
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture

@@ -96,7 +96,13 @@ NoiseBound bound_of(const Options& options, const DesignProblem& problem) {
     return noise_bound(bound);
 }
 
-nlohmann::json to_json(const std::vector<Compared>& all, const Design& design, const Options& options) {
+nlohmann::json to_json(const std::vector<Compared>& all, const Design& design, const DesignProblem& problem,
+                       const Options& options) {
+    auto subjects = nlohmann::json::array();
+    for (Eigen::Index k = 0; k < problem.subjects.rows(); ++k) {
+        const Eigen::VectorXd lamps = problem.subjects.row(k);
+        subjects.push_back(std::vector<double>(lamps.begin(), lamps.end()));
+    }
     auto bases = nlohmann::json::array();
     for (const auto& basis : all)
         bases.push_back({{"name", basis.name},
@@ -107,11 +113,8 @@ nlohmann::json to_json(const std::vector<Compared>& all, const Design& design, c
                          {"gain_over_single", std::sqrt(all[1].cost / basis.cost)},
                          {"lit_min", basis.lit_min},
                          {"lit_max", basis.lit_max}});
-    return {{"output", options.output},
-            {"start", design.start},
-            {"counts", options.counts},
-            {"subject", options.subject},
-            {"bases", bases}};
+    return {{"output", options.output},   {"start", design.start}, {"counts", options.counts},
+            {"subject", options.subject}, {"subjects", subjects},  {"bases", bases}};
 }
 
 void print_table(const std::vector<Compared>& all, const Design& design) {
@@ -140,7 +143,7 @@ Result<int> run(const Options& options) {
     if (const Status status = write_basis(options.output, *basis, comment); !status.ok()) return status.error();
 
     const auto all = compare_all(*problem, *design, *stage);
-    auto json = to_json(all, *design, options);
+    auto json = to_json(all, *design, *problem, options);
     if (options.subject == "equal") json["bound_mean_variance"] = bound_of(options, *problem).mean_variance;
     if (options.json) {
         fmt::print("{}\n", json.dump(1));
