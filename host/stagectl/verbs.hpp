@@ -11,6 +11,8 @@ void add_run_verb(CLI::App& app, int& exit_code);
 void add_play_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);
 void add_sequence_verb(CLI::App& app, int& exit_code);
+void add_basis_verb(CLI::App& app, int& exit_code);
+void add_basis_report_verb(CLI::App& basis, int& exit_code);
 void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_grey_verb(CLI::App& app, int& exit_code);
 void add_ingest_verb(CLI::App& app, int& exit_code);
