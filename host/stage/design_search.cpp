@@ -85,7 +85,7 @@ Result<Design> design_basis(const DesignProblem& problem, const DesignOptions& o
     if (problem.rows < problem.lamps())
         return fail(fmt::format("{} rows cannot tell {} lamps apart: give at least as many rows", problem.rows,
                                 problem.lamps()));
-    const auto starts = design_starts(problem, options.seed);
+    const auto starts = design_starts(problem, options.grey, options.seed);
     std::vector<std::pair<double, size_t>> ranking;
     for (size_t s = 0; s < starts.size(); ++s)
         if (const double cost = design_cost(problem, starts[s].light).cost; std::isfinite(cost))
@@ -95,8 +95,8 @@ Result<Design> design_basis(const DesignProblem& problem, const DesignOptions& o
     std::sort(ranking.begin(), ranking.end());
     ranking.resize(std::min(ranking.size(), size_t(std::max(options.starts, 1))));
 
-    Design best{starts[ranking[0].second].light, 1, ranking[0].first, starts[ranking[0].second].name};
     const int level_max = options.grey ? 255 : 1;
+    Design best{starts[ranking[0].second].light, level_max, ranking[0].first, starts[ranking[0].second].name};
     for (size_t rank = 0; rank < ranking.size(); ++rank) {
         const DesignStart& start = starts[ranking[rank].second];
         Light light = start.light;

@@ -177,6 +177,9 @@ Light cyclic_light(int rows, int lamps, int lit, std::mt19937_64& random) {
 
 namespace {
 
+constexpr double rounding = 1e-9;
+constexpr double grey_level_max = 255;
+
 // "2 x a + b" of a, a, b.
 std::string listed(const std::vector<std::string>& names) {
     std::string text;
@@ -209,14 +212,18 @@ DesignStart side_by_side(const std::vector<BlockDesign>& designs, int lamps, int
     return start;
 }
 
-// Dims what is too bright, lamp by lamp.
-void fit_limits(const DesignProblem& problem, Light& light) {
+// What is too bright loses lamps, or is dimmed as a row, which leaves what rows have in common as it is.
+void fit_limits(const DesignProblem& problem, bool grey, Light& light) {
     for (Index r = 0; r < light.rows(); ++r) {
+        if (const double share = exposure_share(problem, light.row(r)); grey && share < 1)
+            light.row(r) = (light.row(r) * share * grey_level_max).array().floor() / grey_level_max;
         for (;;) {
             Eigen::RowVectorXd excess = Eigen::RowVectorXd::Zero(light.cols());
-            if (problem.brightness_max > 0 && light.row(r).sum() > problem.brightness_max) excess.setOnes();
+            if (problem.brightness_max > 0 && light.row(r).sum() > problem.brightness_max * (1 + rounding))
+                excess.setOnes();
             for (Index card = 0; card < problem.cards.rows(); ++card)
-                if (problem.cards.row(card).dot(light.row(r)) > problem.white_counts) excess += problem.cards.row(card);
+                if (problem.cards.row(card).dot(light.row(r)) > problem.white_counts * (1 + rounding))
+                    excess += problem.cards.row(card);
             Index brightest = 0;
             if (excess.cwiseProduct(light.row(r)).maxCoeff(&brightest) <= 0) break;
             light(r, brightest) = 0;
@@ -226,15 +233,16 @@ void fit_limits(const DesignProblem& problem, Light& light) {
 
 }  // namespace
 
-std::vector<DesignStart> design_starts(const DesignProblem& problem, uint64_t seed) {
+std::vector<DesignStart> design_starts(const DesignProblem& problem, bool grey, uint64_t seed) {
     const int lamps = problem.lamps(), rows = problem.rows;
     std::vector<DesignStart> starts = {{"single", with_rows(Light::Identity(lamps, lamps), rows)}};
     const auto designs = block_designs(rows);
     std::set<std::string> seen;
+    for (const auto& design : designs)
+        if (design.v >= lamps) seen.insert(design.name);
     for (const auto& design : designs) {
         if (design.v >= lamps) {
             const Light light = design.light.leftCols(lamps);
-            seen.insert(design.name);
             starts.push_back({design.name, with_rows(light, rows)});
             starts.push_back({design.name + ", dark for lit", with_rows(Light::Ones(design.v, lamps) - light, rows)});
         } else {
@@ -248,7 +256,7 @@ std::vector<DesignStart> design_starts(const DesignProblem& problem, uint64_t se
     const auto order = shuffled(lamps, random);
     for (auto& start : starts) {
         start.light = Light(start.light(Eigen::all, order));
-        fit_limits(problem, start.light);
+        fit_limits(problem, grey, start.light);
     }
     std::erase_if(starts, [&](const DesignStart& start) { return !is_feasible(problem, start.light); });
     return starts;

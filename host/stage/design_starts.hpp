@@ -12,7 +12,7 @@ namespace ols {
 
 struct DesignStart {
     std::string name;
-    Light light;  // rows x lamps, 0 or 1
+    Light light;  // rows x lamps
 };
 
 // A symmetric block design: v rows over v lamps, each lighting k lamps, any two of them `common` same ones. Of all
@@ -39,8 +39,8 @@ Light cyclic_light(int rows, int lamps, int lit, std::mt19937_64& random);
 
 // Single lamps; designs of at least as many points as lamps, without the columns too many, and what they leave dark;
 // smaller ones side by side, each for its own share of the lamps, so that few lamps are lit at a time; cyclic lights. Rows
-// beyond a start's own repeat it from its beginning. Where a row is too bright, lamps are left out of it: first the one
-// that adds most to what is too bright. Lamps are dealt to columns in an order of `seed`.
-std::vector<DesignStart> design_starts(const DesignProblem& problem, uint64_t seed);
+// beyond a start's own repeat it from its beginning. A row that is too bright is dimmed (grey), or loses lamps:
+// first the one that adds most to what is too bright. Lamps are dealt to columns in an order of `seed`.
+std::vector<DesignStart> design_starts(const DesignProblem& problem, bool grey, uint64_t seed);
 
 }  // namespace ols

@@ -133,7 +133,7 @@ TEST(DesignSearch, exchange_keeps_an_account_of_the_cost_that_is_true_and_never_
         problem.worst = level_max == 255 ? 0.5 : 0;
         problem.cards = 5 * problem.subjects;
         problem.white_counts = 700;
-        for (const auto& start : design_starts(problem, 1)) {
+        for (const auto& start : design_starts(problem, level_max == 255, 1)) {
             const double before = design_cost(problem, start.light).cost;
             if (std::isinf(before)) continue;
             const Light after = exchange(problem, start.light, level_max, 5);
