@@ -93,30 +93,42 @@ int64_t total(Pairs sums) {
     return total;
 }
 
-// Copies a tile's rows to the places. False when a count does not fit int16.
-bool load_short(const HadamardJob& job, size_t begin, size_t count, int16_t* HWY_RESTRICT places) {
+// Copies a tile of 16-bit rows to the places. False when one of them is masked.
+bool load_rows16(const HadamardJob& job, size_t begin, size_t count, int16_t* HWY_RESTRICT places) {
+    const hn::ScalableTag<int16_t> d;
+    auto least = hn::Zero(d);
+    for (size_t r = 0; r < job.rows16.size(); ++r) {
+        int16_t* const to = places + r * tile_samples;
+        if (!job.rows16[r]) return false;
+        const int16_t* const from = job.rows16[r] + begin;
+        if (count == tile_samples) {
+            hwy::Prefetch(from + 4 * tile_samples);
+            hwy::Prefetch(from + 4 * tile_samples + 32);
+            for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) {
+                const auto counts = hn::LoadU(d, from + i);
+                least = hn::Min(least, counts);
+                hn::Store(counts, d, to + i);
+            }
+        } else {
+            std::copy_n(from, count, to);
+            std::fill(to + count, to + tile_samples, int16_t(0));
+            for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) least = hn::Min(least, hn::Load(d, to + i));
+        }
+    }
+    return !job.filler || hn::AllFalse(d, hn::Eq(least, hn::Set(d, masked_sample<int16_t>)));
+}
+
+// The same of `rows` rows of 32 bits, row r at from(r). False when a count does not fit 16 bits, as a masked one does not.
+template <typename From>
+bool load_rows32(const From& row, size_t rows, size_t count, int16_t* HWY_RESTRICT places) {
     const hn::ScalableTag<int16_t> d;
     const hn::Rebind<int32_t, hn::Half<decltype(d)>> d32;
     const hn::Half<decltype(d)> half;
-    if (!job.rows16.empty()) {
-        for (size_t r = 0; r < job.rows16.size(); ++r) {
-            int16_t* const to = places + r * tile_samples;
-            const int16_t* const from = job.rows16[r] + begin;
-            if (count == tile_samples) {
-                hwy::Prefetch(from + 4 * tile_samples);
-                hwy::Prefetch(from + 4 * tile_samples + 32);
-                for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) hn::Store(hn::LoadU(d, from + i), d, to + i);
-            } else {
-                std::copy_n(from, count, to);
-                std::fill(to + count, to + tile_samples, int16_t(0));
-            }
-        }
-        return true;
-    }
     auto wrong = hn::Zero(d32);
-    for (size_t r = 0; r < job.rows32.size(); ++r) {
+    for (size_t r = 0; r < rows; ++r) {
         int16_t* const to = places + r * tile_samples;
-        const int32_t* from = job.rows32[r] + begin;
+        const int32_t* from = row(r);
+        if (!from) return false;
         alignas(64) int32_t tail[tile_samples] = {};
         if (count < tile_samples) from = std::copy_n(from, count, tail) - count;
         for (size_t i = 0; i < tile_samples; i += hn::Lanes(d32)) {
@@ -127,6 +139,12 @@ bool load_short(const HadamardJob& job, size_t begin, size_t count, int16_t* HWY
         }
     }
     return hn::AllTrue(d32, hn::Eq(wrong, hn::Zero(d32)));
+}
+
+bool load_short(const HadamardJob& job, size_t begin, size_t count, int16_t* HWY_RESTRICT places) {
+    if (job.rows32.empty()) return load_rows16(job, begin, count, places);
+    const auto row = [&](size_t r) { return job.rows32[r] ? job.rows32[r] + begin : nullptr; };
+    return load_rows32(row, job.rows32.size(), count, places);
 }
 
 // The sum of all rows, exactly.
@@ -238,21 +256,28 @@ void store_lamps(const HadamardJob& job, size_t begin, size_t count, const Lane*
     }
 }
 
-void load_long(const HadamardJob& job, size_t begin, size_t count, int32_t* places, int32_t* sums) {
-    const size_t rows = std::max(job.rows16.size(), job.rows32.size());
-    std::fill_n(sums, tile_samples, 0);
-    for (size_t r = 0; r < rows; ++r) {
+// Copies a tile's rows, of either width, to places of 32 bits. True when one of them is masked.
+template <typename Sample>
+bool load_long(const HadamardJob& job, std::span<const Sample* const> rows, size_t begin, size_t count,
+               int32_t* places) {
+    bool masked = false;
+    for (size_t r = 0; r < rows.size(); ++r) {
         int32_t* const to = places + r * tile_samples;
-        for (size_t i = 0; i < count; ++i)
-            to[i] = job.rows16.empty() ? job.rows32[r][begin + i] : job.rows16[r][begin + i];
+        if (!rows[r]) std::fill_n(to, count, masked_sample<int32_t>), masked = true;
+        for (size_t i = 0; rows[r] && i < count; ++i) {
+            const Sample counts = rows[r][begin + i];
+            const bool lost = job.filler && counts == masked_sample<Sample>;
+            to[i] = lost ? masked_sample<int32_t> : counts;
+            masked = masked || lost;
+        }
         std::fill(to + count, to + tile_samples, 0);
-        for (size_t i = 0; i < tile_samples; ++i) sums[i] += to[i];
     }
+    return masked;
 }
 
+// Inverts the rows that lie in the places. False when a sum wrapped.
 bool invert_short(const HadamardJob& job, size_t begin, size_t count, int16_t* places) {
     alignas(64) int32_t sums[tile_samples];
-    if (!load_short(job, begin, count, places)) return false;
     const int64_t squares_in = row_squares(*job.plan, places);
     sum_rows(*job.plan, places, sums);
     play(*job.code, places);
@@ -262,19 +287,32 @@ bool invert_short(const HadamardJob& job, size_t begin, size_t count, int16_t* p
 }
 
 void invert_long(const HadamardJob& job, size_t begin, size_t count, int32_t* places) {
-    alignas(64) int32_t sums[tile_samples];
-    load_long(job, begin, count, places, sums);
+    alignas(64) int32_t sums[tile_samples] = {};
+    for (size_t r = 0; r < size_t(job.plan->plan.inputs()); ++r)
+        for (size_t i = 0; i < tile_samples; ++i) sums[i] += places[r * tile_samples + i];
     play(*job.code, places);
     store_lamps(job, begin, count, places, sums);
 }
 
 void invert(const HadamardJob& job, size_t begin, size_t end, TileScratch& scratch, TileCounts& counts) {
+    int16_t* const short_places = scratch.short_places();
+    int32_t* const long_places = scratch.long_places();
     for (; begin < end; begin += tile_samples) {
         const size_t count = std::min(tile_samples, end - begin);
         counts.tiles++;
-        if (invert_short(job, begin, count, scratch.short_places())) continue;
+        if (load_short(job, begin, count, short_places) && invert_short(job, begin, count, short_places)) continue;
+        const bool masked = job.rows32.empty() ? load_long(job, job.rows16, begin, count, long_places)
+                                               : load_long(job, job.rows32, begin, count, long_places);
+        if (masked) {
+            counts.filled++;
+            job.filler->fill(long_places, begin, count);
+            const auto row = [&](size_t r) { return long_places + r * tile_samples; };
+            if (load_rows32(row, size_t(job.plan->plan.inputs()), count, short_places) &&
+                invert_short(job, begin, count, short_places))
+                continue;
+        }
         counts.fallbacks++;
-        invert_long(job, begin, count, scratch.long_places());
+        invert_long(job, begin, count, long_places);
     }
 }
 

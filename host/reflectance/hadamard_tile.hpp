@@ -8,6 +8,7 @@
 #include <span>
 
 #include "reflectance/hadamard_plan.hpp"
+#include "reflectance/masked_sample.hpp"
 
 namespace ols {
 
@@ -24,10 +25,13 @@ struct HadamardJob {
     std::span<float* const> lamps;
     std::span<int32_t* const> sums;
     std::span<const float> factors;  // a sample each
+    // Asked for the samples of every tile that has a masked one (masked_sample.hpp). Without it nothing is masked: the
+    // lowest value is a count like any other, and no row is null.
+    const SampleFiller* filler = nullptr;
 };
 
 struct TileCounts {
-    uint64_t tiles = 0, fallbacks = 0;  // inverted; of these, in 32 bits
+    uint64_t tiles = 0, fallbacks = 0, filled = 0;  // inverted; of these, in 32 bits; of all, with masked samples
 };
 
 // Scratch of one thread.

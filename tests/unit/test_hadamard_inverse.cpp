@@ -154,6 +154,73 @@ TEST_P(HadamardInverse, ordinary_counts_need_no_fallback) {
         for (size_t p = 0; p < 640; ++p) ASSERT_EQ(sums[size_t(lamp)][p], one * lamps[size_t(lamp)][p]);
 }
 
+// A filler whose values are easy to foretell.
+class FillsWithSampleNumber : public SampleFiller {
+  public:
+    explicit FillsWithSampleNumber(int rows) : rows_(rows) {}
+
+    void fill(int32_t* tile, size_t begin, size_t count) const override {
+        for (int row = 0; row < rows_; ++row)
+            for (size_t i = 0; i < count; ++i) {
+                int32_t& sample = tile[size_t(row) * tile_samples + i];
+                if (sample == masked_sample<int32_t>) sample = int32_t(begin + i) + row;
+            }
+    }
+
+  private:
+    int rows_;
+};
+
+TEST_P(HadamardInverse, masked_samples_and_lost_rows_are_inverted_as_they_are_filled) {
+    constexpr size_t samples = 5 * tile_samples + 7;
+    Planes rows = random_rows(samples, -40, 200), filled = rows;
+    const auto mask = [&](int row, size_t p) {
+        rows[size_t(row)][p] = masked_sample<int32_t>;
+        filled[size_t(row)][p] = int32_t(p) + row;
+    };
+    mask(3, 5), mask(4, 5), mask(0, 2 * tile_samples), mask(basis.rows - 1, samples - 1);
+    rows[7][3 * tile_samples] = filled[7][3 * tile_samples] = 1 << 20;  // not masked; too large for 16 bits
+    const FillsWithSampleNumber filler(basis.rows);
+    for (const bool with_lost_row : {false, true}) {
+        for (size_t p = 0; with_lost_row && p < samples; ++p) mask(9, p);
+        const Planes truth = by_definition(basis, filled);
+        auto rows32 = pointers<const int32_t>(rows);
+        if (with_lost_row) rows32[9] = nullptr;
+        for (const char* path : tile_paths()) {
+            choose_tile_path(path);
+            Planes sums(size_t(basis.lamps), std::vector<int32_t>(samples));
+            TileScratch scratch(code);
+            counts = {};
+            const auto out = pointers<int32_t>(sums);
+            invert_tiles({&plan, &code, {}, rows32, {}, out, {}, &filler}, 0, samples, scratch, counts);
+            EXPECT_EQ(sums, truth) << path;
+            EXPECT_EQ(counts.filled, with_lost_row ? counts.tiles : 3u) << path;
+            EXPECT_EQ(counts.fallbacks, 1u) << path;
+        }
+    }
+}
+
+TEST_P(HadamardInverse, the_lowest_value_of_16_bits_is_a_count_unless_there_is_a_filler) {
+    Planes rows = random_rows(70, -40, 200);
+    rows[5][3] = -32768;
+    rows[6][66] = -32768;
+    EXPECT_EQ(inverted(rows), by_definition(basis, rows));
+    std::vector<std::vector<int16_t>> short_rows;
+    for (const auto& row : rows) short_rows.emplace_back(row.begin(), row.end());
+    rows[5][3] = 8, rows[6][66] = 72;
+    const FillsWithSampleNumber filler(basis.rows);
+    auto rows16 = pointers<const int16_t>(short_rows);
+    for (const char* path : tile_paths()) {
+        choose_tile_path(path);
+        Planes sums(size_t(basis.lamps), std::vector<int32_t>(70));
+        TileScratch scratch(code);
+        const auto out = pointers<int32_t>(sums);
+        invert_tiles({&plan, &code, rows16, {}, {}, out, {}, &filler}, 0, 70, scratch, counts = {});
+        EXPECT_EQ(sums, by_definition(basis, rows)) << path;
+        EXPECT_EQ(counts.filled, 2u) << path;
+    }
+}
+
 // A plain sum takes rows - 1 additions a lamp: 24 648 and 24 180.
 TEST(HadamardPlan, takes_a_ninth_and_a_seventh_of_the_additions) {
     EXPECT_LE(hadamard_plan(*find_basis("s159"))->plan.additions(), 2718);
