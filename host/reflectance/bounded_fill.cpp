@@ -3,12 +3,14 @@
 #include "reflectance/bounded_fill.hpp"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 
 namespace ols {
 
 namespace {
 
-constexpr int steps_max = 20;
+constexpr int steps_max = 50;     // some 10 are usual
+constexpr int halvings_max = 20;  // of a step that does not descend
 
 using ActiveSet = Eigen::Array<bool, Eigen::Dynamic, 1>;
 
@@ -30,21 +32,29 @@ void bound_fill(const FillModel& model, const std::vector<int>& masked, const Fi
     form += row_weight * model.residual(masked, Eigen::all);
     const Eigen::VectorXd pull = -form * rest;
     const Eigen::MatrixXd free_form = form(Eigen::all, masked);
-    ActiveSet below, dark;
+    const auto value = [&](const Eigen::VectorXd& y, const Eigen::VectorXd& x) {
+        return y.dot(free_form * y - 2 * pull) + image_weight * x.cwiseMin(0).squaredNorm() +
+               row_weight * (least - y.array()).max(0).square().sum();
+    };
+    double reached = value(filled, images);
     for (int step = 0; step < steps_max; ++step) {
-        const ActiveSet below_now = filled.array() < least, dark_now = images.array() < 0;
-        if (step > 0 && (below_now == below).all() && (dark_now == dark).all()) break;
-        below = below_now, dark = dark_now;
-        const Eigen::VectorXd below_weight = row_weight * below.cast<double>();
-        const Eigen::VectorXd dark_weight = image_weight * dark.cast<double>();
-        const Eigen::MatrixXd weighted = dark_weight.asDiagonal() * images_of;
+        const ActiveSet below = filled.array() < least, dark = images.array() < 0;
+        const Eigen::MatrixXd weighted = (image_weight * dark.cast<double>()).matrix().asDiagonal() * images_of;
         Eigen::MatrixXd newton = free_form;
         newton.noalias() += images_of.transpose() * weighted;
-        newton.diagonal() += below_weight;
+        newton.diagonal() += row_weight * below.cast<double>().matrix();
         const Eigen::VectorXd target =
             pull - weighted.transpose() * images_of_rest + below.select(row_weight * least, 0.0).matrix();
-        filled = newton.llt().solve(target);
-        images = images_of_rest + images_of * filled;
+        Eigen::VectorXd move = newton.llt().solve(target) - filled;
+        const double before = reached;
+        for (int halving = 0; halving < halvings_max; ++halving, move /= 2) {
+            const Eigen::VectorXd moved = filled + move, moved_images = images_of_rest + images_of * moved;
+            const double there = value(moved, moved_images);
+            if (there >= reached) continue;
+            filled = moved, images = moved_images, reached = there;
+            break;
+        }
+        if (!(reached < before - 1e-12 * std::abs(before))) break;
     }
     rows(masked) = filled;
 }

@@ -21,7 +21,7 @@ struct FillBounds {
 // with s the noise of a row and s_x that of an image: the posterior's mode under the prior cut off at zero, no sharper than
 // noise allows; hard bounds leave no value at all, for half of the lamps are dark and noise makes some of those negative.
 // tau^2 is the most likely for the smooth estimate, |x|_K^2 / images. The function is convex and piecewise quadratic: Newton's
-// method on the active set (Mangasarian, "A finite Newton method for classification", 2002), 20 steps at most.
+// method on the active set (Mangasarian, "A finite Newton method for classification", 2002), each step halved until it descends.
 void bound_fill(const FillModel& model, const std::vector<int>& masked, const FillBounds& bounds,
                 Eigen::VectorXd& rows);
 

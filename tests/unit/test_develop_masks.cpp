@@ -117,7 +117,7 @@ TEST(DevelopMasks, a_lost_slot_of_s159_costs_the_noise_that_least_squares_forete
     Scene scene("s159");
     CycleFrames frames = scene.record();
     auto times = scene.once();
-    for (const int row : {70, 12}) {  // one lost, then two
+    for (const int row : {5, 6}) {  // one lost, then two
         frames.slots[scene.slot_of(row)] = nullptr;
         times[size_t(row)] = 0;
         const auto target = develop_cycle(frames, scene.sequence, scene.calibration, noise);
