@@ -17,7 +17,7 @@ using namespace ols;
 
 namespace {
 
-constexpr int size = 72, pixels = size * size;
+constexpr int size = 40, pixels = size * size;
 constexpr float white = 4031;  // counts above black
 constexpr int highlight_lamp = 20, side_lamp = 60;
 using Planes = std::vector<std::vector<float>>;
@@ -47,7 +47,7 @@ struct Take {
                 const double cosine = dot(normal, lamps[i].direction);
                 const Vec3 half = normalized(lamps[i].direction + Vec3{0, 0, 1});
                 if (cosine > 0)
-                    truth[i][size_t(p)] = float(15 * cosine + 1500 * std::pow(std::max(0.0, dot(normal, half)), 150));
+                    truth[i][size_t(p)] = float(15 * cosine + 3000 * std::pow(std::max(0.0, dot(normal, half)), 60));
             }
         }
         std::mt19937 random(6);
