@@ -20,6 +20,7 @@ struct Options {
     std::string output, calibration, frames;
     TakeInfo slate;
     int cycles = 0;
+    std::string fill = "none", estimate = "none";
     bool nominal = false, overwrite = false, single_float = false, json = false;
 };
 
@@ -60,6 +61,8 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
             {"saturated_share", report.saturated_share},
+            {"estimated_share", report.estimated_share},
+            {"unsolved_share", report.unsolved_share},
             {"seconds",
              {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
 }
@@ -75,9 +78,15 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);
     if (report.saturated_share > 0)
+        fmt::print(
+            stderr,
+            "stagectl: {:.2g} % of the pixels have saturated samples, which are left out: shorten the exposure\n",
+            report.saturated_share * 100);
+    if (report.unsolved_share > 0)
         fmt::print(stderr,
-                   "stagectl: {:.2g} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
-                   report.saturated_share * 100);
+                   "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: --estimate "
+                   "smooth or nonnegative estimates them\n",
+                   report.unsolved_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (is_estimate)
         fmt::print(stderr,
@@ -103,6 +112,14 @@ void add_to_account(std::ofstream& account, const Frame& frame) {
             << '\n';
 }
 
+TakeMasks masks_of(const Options& options) {
+    TakeMasks masks;
+    masks.fill_from_neighbours = options.fill == "neighbours";
+    if (options.estimate == "smooth") masks.estimate = Estimate::smooth;
+    if (options.estimate == "nonnegative") masks.estimate = Estimate::nonnegative;
+    return masks;
+}
+
 Result<int> run(const Options& options) {
     auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
@@ -126,8 +143,8 @@ Result<int> run(const Options& options) {
     if (!archive.ok()) return archive.error();
 
     const auto report = run_take(
-        *session->board, *session->camera, *sequence, *stage, *calibration, *archive, stop_on_signal(),
-        [&](const Frame& frame) { add_to_account(*account, frame); },
+        *session->board, *session->camera, *sequence, *stage, *calibration, masks_of(options), *archive,
+        stop_on_signal(), [&](const Frame& frame) { add_to_account(*account, frame); },
         [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
     if (!report.ok()) return report.error();
     print_report(*report, sequence->basis.is_estimate, options);
@@ -157,6 +174,16 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->add_flag("--nominal", options->nominal, "no calibration: black level and gain as the stage states them");
     verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();
     verb->add_option("--frames", options->frames, "file for a JSON line a frame: its id and time, its cycle and slot");
+    verb->add_option("--fill", options->fill,
+                     "lost slots of the basis: none, or neighbours: the same slot of the cycles before and after; a "
+                     "subject that moves smears")
+        ->check(CLI::IsMember({"none", "neighbours"}));
+    verb->add_option(
+            "--estimate", options->estimate,
+            "pixels whose lost and saturated samples the others do not determine: none: 0 and masked; smooth: "
+            "neighbouring lamps give similar values; nonnegative: and no lamp less than nothing, no saturated "
+            "sample less than white; some milliseconds a pixel. Estimates are masked, with a bound of their bias")
+        ->check(CLI::IsMember({"none", "smooth", "nonnegative"}));
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");
