@@ -11,6 +11,7 @@
 #include <set>
 
 #include "stage/hadamard.hpp"
+#include "stage/projective_space.hpp"
 
 namespace ols {
 
@@ -24,30 +25,11 @@ bool is_prime(int n) {
     return n > 1;
 }
 
-// One vector for each point of PG(d, q): those of GF(q)^(d+1) whose first element that is not 0 is 1.
-std::vector<std::vector<int>> projective_points(int dimension, int q, int most) {
-    std::vector<std::vector<int>> points;
-    for (int leading = dimension; leading >= 0; --leading) {
-        std::vector<int> point(size_t(dimension) + 1, 0);
-        point[size_t(leading)] = 1;
-        while (int(points.size()) <= most) {
-            points.push_back(point);
-            int digit = dimension;
-            while (digit > leading && ++point[size_t(digit)] == q) point[size_t(digit--)] = 0;
-            if (digit == leading) break;
-        }
-    }
-    return points;
-}
-
 BlockDesign projective_design(int dimension, int q, const std::vector<std::vector<int>>& points) {
     const auto v = Index(points.size());
     BlockDesign design{fmt::format("PG({}, {})", dimension, q), int(v), 0, Light::Zero(v, v)};
     for (Index r = 0; r < v; ++r)
-        for (Index i = 0; i < v; ++i) {
-            const auto &plane = points[size_t(r)], &point = points[size_t(i)];
-            design.light(r, i) = std::inner_product(plane.begin(), plane.end(), point.begin(), 0) % q == 0;
-        }
+        for (Index i = 0; i < v; ++i) design.light(r, i) = lies_on(points[size_t(i)], points[size_t(r)], q);
     design.k = int(design.light.row(0).sum());
     return design;
 }

@@ -8,7 +8,7 @@ from virtual_take import HEIGHT, WIDTH, VirtualStage, manifest, read_lamps
 
 CARD = 0.985
 COUNTS_PER_US = 2.52
-KINDS = ["single", "triangle", "triangle300", "s159", "hadamard156", "s155", "paley163", "spherical_harmonics:4", "mine.csv"]
+KINDS = ["single", "triangle", "triangle300", "planes156", "s159", "hadamard156", "s155", "paley163", "spherical_harmonics:4", "mine.csv"]
 
 
 @pytest.fixture(scope="module")
