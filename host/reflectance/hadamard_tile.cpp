@@ -34,7 +34,8 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // What codelets add up: the compiler's own vectors, of which it keeps more in registers than of Highway's structures.
-typedef int16_t ShortLanes __attribute__((vector_size(hn::MaxLanes(Shorts()) * sizeof(int16_t)), may_alias));
+// Unsigned, for sums on the way may wrap, and only those of unsigned numbers may do so in C++.
+typedef uint16_t ShortLanes __attribute__((vector_size(hn::MaxLanes(Shorts()) * sizeof(uint16_t)), may_alias));
 
 HWY_INLINE ShortLanes& at(int16_t* places, size_t place) {
     return *reinterpret_cast<ShortLanes*>(places + place * tile_samples);
