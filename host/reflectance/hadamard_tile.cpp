@@ -4,12 +4,15 @@
 //
 // The certificate: H H' = n I, so that the sum of all z^2 of a sample is n times the sum of its y^2 (Parseval). A z that
 // wrapped modulo 2^16 has a smaller square than the true one, so that the sum over a tile is n times that of the rows only
-// if none did; -32768, which 32768 wraps to, counts as wrapped. Both sides are computed exactly (squares.hpp). Sums on
+// if none did; -32768, which 32768 wraps to, counts as wrapped. Both sides are computed exactly (SquareSum). Sums on
 // the way to z may wrap, which changes nothing modulo 2^16.
 //
 // z(0), the sum of all rows, mostly wraps. It is known modulo 2^16 from the wrapped sum, and from the sum of y >> 8 to
 // +-20400, which together give it exactly.
 #include "reflectance/hadamard_tile.hpp"
+
+// No processor made since 2008 has SSSE3 and not SSE4.1, and each path takes seconds to compile.
+#define HWY_DISABLED_TARGETS HWY_SSSE3
 
 #include <algorithm>
 #include <cassert>
@@ -23,13 +26,12 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include "reflectance/tile_sink_inl.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace ols {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using Shorts = hn::CappedTag<int16_t, tile_samples>;
-using Longs = hn::CappedTag<int32_t, tile_samples / 2>;  // as many bytes
 
 // What codelets add up: the compiler's own vectors, of which it keeps more in registers than of Highway's structures.
 typedef int16_t ShortLanes __attribute__((vector_size(hn::MaxLanes(Shorts()) * sizeof(int16_t)), may_alias));
@@ -52,51 +54,6 @@ void run_codelet(Codelet codelet, const int16_t* from, int16_t* to) {
     }
 }
 
-HWY_INLINE auto load_long(const int32_t* z) {
-    return hn::Load(Longs(), z);
-}
-HWY_INLINE auto load_long(const int16_t* z) {
-    return hn::PromoteTo(Longs(), hn::Load(hn::Rebind<int16_t, Longs>(), z));
-}
-
-// The sum of the squares of int16 vectors, none of which has -32768, exact while they are fewer than 2^16 pairs: lanes
-// add up the squares of two pairs, below 2^32, modulo 2^32, and the upper halves of these.
-class SquareSum {
-    using Vector = decltype(hn::Zero(Longs()));
-    using ShortVector = decltype(hn::Zero(Shorts()));
-    static constexpr bool has_second = HWY_ARCH_ARM;  // x86 adds the squares of neighbours up, others have two vectors
-
-  public:
-    HWY_INLINE SquareSum() : whole_(hn::Zero(d)), upper_(hn::Zero(d)) {}
-
-    HWY_INLINE void add(ShortVector a, ShortVector b) {
-        Vector second = hn::Zero(d), first = hn::ReorderWidenMulAccumulate(d, a, a, hn::Zero(d), second);
-        first = hn::ReorderWidenMulAccumulate(d, b, b, first, second);
-        add_lanes(first);
-        if (has_second) add_lanes(second);
-    }
-
-    int64_t total() const {
-        alignas(64) uint32_t whole[hn::MaxLanes(Longs())], upper[hn::MaxLanes(Longs())];
-        hn::Store(hn::BitCast(du, whole_), du, whole);
-        hn::Store(hn::BitCast(du, upper_), du, upper);
-        int64_t total = 0;
-        for (size_t i = 0; i < hn::Lanes(d); ++i)
-            total += (int64_t(upper[i]) << 16) + uint32_t(whole[i] - (upper[i] << 16));
-        return total;
-    }
-
-  private:
-    HWY_INLINE void add_lanes(Vector squares) {
-        whole_ = hn::Add(whole_, squares);
-        upper_ = hn::Add(upper_, hn::BitCast(d, hn::ShiftRight<16>(hn::BitCast(du, squares))));
-    }
-
-    static constexpr Longs d{};
-    static constexpr hn::RebindToUnsigned<Longs> du{};
-    Vector whole_, upper_;
-};
-
 // Plays all sums over the places, in 32 bits.
 void play(const SumCode& plan, int32_t* HWY_RESTRICT places) {
     const Longs d;
@@ -117,7 +74,6 @@ void play(const SumCode& plan, int32_t* HWY_RESTRICT places) {
 }
 
 // The rows of a tile: sample i of row r is rows[r][offset + i].
-constexpr size_t tiles_ahead = 2;
 struct TileRows {
     const int16_t* const* rows;
     size_t offset, ahead;  // ahead: from here to the samples to fetch into the cache for a tile to come
@@ -201,120 +157,46 @@ bool certify(const HadamardPlan& plan, const int16_t* HWY_RESTRICT places, const
            squares.total() == plan.order * sums.squares - square_of_sums;
 }
 
-using LongVector = decltype(hn::Zero(Longs()));
-using Floats = hn::Rebind<float, Longs>;
-
-#if HWY_TARGET == HWY_NEON || (HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2)
-template <class V>
-HWY_INLINE auto half_of(V value) {
-    return hn::BitCast(hn::Rebind<uint16_t, Longs>(), hn::DemoteTo(hn::Rebind<hwy::float16_t, Longs>(), value));
-}
-#else
-// Without an instruction for it: the rounding of a float addition, or of integers, does the rounding to even (F. Giesen,
-// "Float->half variants", 2012).
-template <class V>
-HWY_INLINE auto half_of(V value) {
-    const Floats df;
-    const hn::RebindToUnsigned<Floats> du;
-    const hn::RebindToSigned<Floats> di;
-    const auto bits = hn::BitCast(di, value), magnitude = hn::And(bits, hn::Set(di, 0x7fffffff));
-    const auto sign = hn::BitCast(di, hn::ShiftRight<16>(hn::BitCast(du, hn::Xor(bits, magnitude))));
-    const auto subnormal_magic = hn::Set(di, (127 - 15 + 23 - 10 + 1) << 23);
-    const auto shifted = hn::Add(hn::BitCast(df, magnitude), hn::BitCast(df, subnormal_magic));
-    const auto subnormal = hn::Sub(hn::BitCast(di, shifted), subnormal_magic);
-    const auto odd = hn::And(hn::ShiftRight<13>(magnitude), hn::Set(di, 1));
-    const auto rounded = hn::Add(hn::Add(magnitude, hn::Set(di, 0xfff - ((127 - 15) << 23))), odd);
-    auto half =
-        hn::IfThenElse(hn::Lt(magnitude, hn::Set(di, (127 - 14) << 23)), subnormal, hn::ShiftRight<13>(rounded));
-    const auto infinite = hn::Set(di, 255 << 23);
-    half = hn::IfThenElse(hn::Lt(magnitude, hn::Set(di, (127 + 16) << 23)), half, hn::Set(di, 0x7c00));
-    half = hn::IfThenElse(hn::Gt(magnitude, infinite), hn::Set(di, 0x7e00), half);
-    return hn::DemoteTo(hn::Rebind<uint16_t, Longs>(), hn::Or(half, sign));
-}
-#endif
-
-// One vector of z as each type of output.
-HWY_INLINE auto converted(LongVector z, const float*, int32_t) {
-    return z;
-}
-HWY_INLINE auto converted(LongVector z, const float*, int16_t) {
-    return hn::DemoteTo(hn::Rebind<int16_t, Longs>(), z);  // saturates
-}
-HWY_INLINE auto converted(LongVector z, const float* factors, float) {
-    return hn::Mul(hn::ConvertTo(Floats(), z), hn::Load(Floats(), factors));
-}
-HWY_INLINE auto converted(LongVector z, const float* factors, uint16_t) {
-    return half_of(converted(z, factors, float()));
+uint64_t count_clipped(const int32_t* z, size_t count) {
+    return uint64_t(std::count_if(z, z + count, [](int32_t v) { return v != std::clamp(v, INT16_MIN, INT16_MAX); }));
 }
 
-// Stream for vectors of 16 bytes or more, which alone there are instructions for.
-template <class V, class D, typename Value>
-HWY_INLINE void write_past(V v, D d, Value* to) {
-    if constexpr (hn::MaxLanes(D()) * sizeof(Value) >= 16)
-        hn::Stream(v, d, to);
-    else
-        hn::Store(v, d, to);
-}
-
-// Where a tile's values go: whole aligned tiles past the caches, as they are not read again soon.
-template <typename Value>
-struct Sink {
-    Planes<Value> planes;
-    size_t offset, count;
-    const float* factors;  // aligned
-
-    template <typename Lane>
-    HWY_INLINE void put(size_t lamp, const Lane* z) const {
-        Value* const to = planes.first[lamp] + offset;
-        if (count == tile_samples && reinterpret_cast<uintptr_t>(to) % 64 == 0) return stream(z, to);
-        alignas(64) Value values[tile_samples];
-        for (size_t i = 0; i < tile_samples; i += hn::Lanes(Longs()))
-            hn::Store(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), values + i);
-        std::copy_n(values, count, to);
-    }
-
-  private:
-    template <typename Lane>
-    HWY_INLINE void stream(const Lane* z, Value* to) const {
-        if constexpr (std::is_same_v<Value, Lane>) {
-            const hn::CappedTag<Value, tile_samples> d;
-            for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) hn::Stream(hn::Load(d, z + i), d, to + i);
-        } else {
-            for (size_t i = 0; i < tile_samples; i += hn::Lanes(Longs()))
-                write_past(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), to + i);
-        }
-    }
-};
-
-// All lamps of a tile, from outputs in either width: z(k) at z(k).
+// All lamps of a tile, from outputs in either width: those of z(k) at z(k). Returns how many were clipped.
 template <typename Lane, typename Value, typename Z>
-void store_lamps(const HadamardPlan& plan, const Sink<Value>& sink, const Z& z, const Lane* extra_row,
-                 const int32_t* sums) {
+uint64_t store_lamps(const HadamardPlan& plan, const Sink<Value>& sink, const Z& z, const Lane* extra_row,
+                     const int32_t* sums) {
+    uint64_t clipped = 0;
+    const auto put = [&](size_t lamp, const auto* values) HWY_ATTR {
+        sink.put(lamp, values);
+        if constexpr (std::is_same_v<Value, int16_t> && std::is_same_v<decltype(values), const int32_t*>)
+            clipped += count_clipped(values, sink.count);
+    };
     for (size_t lamp = 0; lamp < plan.lamp_output.size(); ++lamp) {
         const int output = plan.lamp_output[lamp];
         if (output > 0) {
-            sink.put(lamp, z(size_t(output)));
+            put(lamp, z(size_t(output)));
         } else {
             alignas(64) int32_t wide[tile_samples];
             for (size_t i = 0; i < tile_samples; ++i) wide[i] = sums[i] + plan.extra_weight * extra_row[i];
-            sink.put(lamp, wide);
+            put(lamp, static_cast<const int32_t*>(wide));
         }
     }
+    return clipped;
 }
 
 template <typename Lane, typename Z>
-void store_lamps(const HadamardJob& job, size_t begin, size_t count, const Z& z, const Lane* extra_row,
-                 const int32_t* sums) {
+uint64_t store_lamps(const HadamardJob& job, size_t begin, size_t count, const Z& z, const Lane* extra_row,
+                     const int32_t* sums) {
     alignas(64) float factors[tile_samples];
     if (!job.factors.empty()) std::copy_n(job.factors.data() + begin, count, factors);
-    const auto store = [&](const auto& planes) {
-        if (!planes.empty())
-            store_lamps(
-                *job.plan,
-                Sink<std::remove_cvref_t<decltype(*planes.first[0])>>{planes, planes.offset(begin), count, factors}, z,
-                extra_row, sums);
+    uint64_t clipped = 0;
+    const auto store = [&]<typename Value>(const Planes<Value>& planes) HWY_ATTR {
+        if (planes.empty()) return;
+        const Sink<Value> sink{planes, planes.offset(begin), count, factors};
+        clipped += store_lamps(*job.plan, sink, z, extra_row, sums);
     };
     store(job.sums), store(job.shorts), store(job.floats), store(job.halves);
+    return clipped;
 }
 
 // Copies the tile of a row, of 32 bits at `from`, to one of 16. False when a count does not fit.
@@ -331,6 +213,22 @@ bool narrow_row(const int32_t* from, size_t count, int16_t* HWY_RESTRICT to) {
         hn::Store(demoted, narrow, to + i);
     }
     return hn::AllTrue(d, hn::Eq(wrong, hn::Zero(d)));
+}
+
+// What is fetched into caches before it is needed. The nearest one gets the tile after the next. Plain images are also
+// fetched into the second, half a kilobyte (of 16 bits) an image at a time: a line of each in turn would have the memory open a
+// page for every line, and where images are a multiple of 4 KB apart, as most are, the lines of all rows would contend
+// for one set of the nearest cache for longer than it can hold them. Tiles lie one behind the other, as the processor expects.
+constexpr size_t tiles_ahead = 2, tiles_fetched = 8;
+
+// Inline, for the compiler leaves out calls of a function that changes nothing.
+template <typename Sample>
+HWY_INLINE void fetch_ahead(const Planes<const Sample>& rows, size_t begin) {
+    constexpr size_t run = tiles_fetched * tile_samples, line = 64 / sizeof(Sample);
+    if (rows.tile_step != tile_samples || begin % run != 0) return;
+    for (const Sample* row : rows.first)
+        for (size_t at = run; at < 2 * run; at += line)
+            __builtin_prefetch(row + begin + at, 0, 2);  // past the end of a row it does nothing
 }
 
 class TileInverter {
@@ -362,17 +260,18 @@ class TileInverter {
     // False when a sample is masked, or a count or a sum does not fit 16 bits.
     bool invert_as_they_are(size_t begin, size_t count) {
         if (!job_.rows32.empty()) {
+            fetch_ahead(job_.rows32, begin);
             const size_t offset = job_.rows32.offset(begin);
             return narrow([&](int r) { return job_.rows32.first[size_t(r)] + offset; }, count) &&
                    invert_short({copies_.data(), 0, 0}, begin, count);
         }
         const size_t offset = job_.rows16.offset(begin);
+        fetch_ahead(job_.rows16, begin);
         if (count == tile_samples)
             return invert_short({job_.rows16.first.data(), offset, tiles_ahead * job_.rows16.tile_step}, begin, count);
         for (int r = 0; r < plan_.rows; ++r) {
             int16_t* const to = scratch_.copied_rows() + size_t(r) * tile_samples;
-            std::fill(std::copy_n(job_.rows16.first[size_t(r)] + offset, count, to), to + (tile_samples - count),
-                      int16_t(0));
+            std::fill(std::copy_n(job_.rows16.first[size_t(r)] + offset, count, to), to + tile_samples, int16_t(0));
         }
         return invert_short({copies_.data(), 0, 0}, begin, count);
     }
@@ -394,8 +293,8 @@ class TileInverter {
             run_codelet(step.codelet, places + size_t(step.from) * tile_samples,
                         places + size_t(step.to) * tile_samples);
         if (!certify(plan_, places, sums)) return false;
-        const auto z = [&](size_t k) { return places + size_t(plan_.outputs[k - 1]) * tile_samples; };
-        store_lamps(job_, begin, count, z, tile.rows[plan_.extra_row] + tile.offset, sums.sums);
+        const auto z = [&](size_t k) -> const int16_t* { return places + size_t(plan_.outputs[k - 1]) * tile_samples; };
+        counts_.clipped += store_lamps(job_, begin, count, z, tile.rows[plan_.extra_row] + tile.offset, sums.sums);
         return true;
     }
 
@@ -422,10 +321,10 @@ class TileInverter {
         for (int r = 0; r < plan_.rows; ++r)
             for (size_t i = 0; i < tile_samples; ++i) sums[i] += places[size_t(r) * tile_samples + i];
         play(plan_.code, places);
-        const auto z = [&](size_t k) { return places + size_t(plan_.code.outputs[k - 1]) * tile_samples; };
-        for (size_t k = 1; !job_.shorts.empty() && k < size_t(plan_.order); ++k)
-            for (size_t i = 0; i < count; ++i) counts_.clipped += std::abs(z(k)[i]) > INT16_MAX;
-        store_lamps(job_, begin, count, z, places + size_t(plan_.extra_row) * tile_samples, sums);
+        const auto z = [&](size_t k) -> const int32_t* {
+            return places + size_t(plan_.code.outputs[k - 1]) * tile_samples;
+        };
+        counts_.clipped += store_lamps(job_, begin, count, z, places + size_t(plan_.extra_row) * tile_samples, sums);
     }
 
     const HadamardJob& job_;

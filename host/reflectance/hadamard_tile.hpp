@@ -19,7 +19,7 @@ struct HadamardJob {
     // One of the two, a plane a row of the basis.
     Planes<const int16_t> rows16 = {};
     Planes<const int32_t> rows32 = {};  // |counts| < 2^23
-    // One of these, a plane a lamp:
+    // Any of these, a plane a lamp:
     Planes<int32_t> sums = {};     // z itself
     Planes<int16_t> shorts = {};   // z, the nearest there is where it does not fit; TileCounts::clipped counts these
     Planes<float> floats = {};     // z times factor

@@ -76,14 +76,14 @@ Target through_archive(const Target& target) {
     return *back;
 }
 
-// r of one lamp and pixel by the plain weighted sum, exact but for the last factor.
+// r of one lamp and pixel by the plain weighted sum.
 double weighted_sum(const Sequence& sequence, const CycleFrames& frames, int lamp, size_t pixel) {
     double sum = 0;
     for (size_t s = 0; s < frames.slots.size(); ++s)
         if (sequence.slots[s].kind == SlotKind::basis)
-            sum += sequence.basis.weight(sequence.slots[s].row, lamp) *
+            sum += sequence.basis.inverse(sequence.slots[s].row, lamp) *
                    (reinterpret_cast<const float*>(frames.slots[s]->samples.data())[pixel] - 64);
-    return sum * sequence.basis.scale / (2.5 * 100);
+    return sum / (2.5 * 100);
 }
 
 }  // namespace
