@@ -76,19 +76,19 @@ Target through_archive(const Target& target) {
     return *back;
 }
 
-// r of one lamp and pixel by the plain weighted sum.
+// r of one lamp and pixel by the plain weighted sum, exact but for the last factor.
 double weighted_sum(const Sequence& sequence, const CycleFrames& frames, int lamp, size_t pixel) {
     double sum = 0;
     for (size_t s = 0; s < frames.slots.size(); ++s)
         if (sequence.slots[s].kind == SlotKind::basis)
-            sum += sequence.basis.inverse(sequence.slots[s].row, lamp) *
+            sum += sequence.basis.weight(sequence.slots[s].row, lamp) *
                    (reinterpret_cast<const float*>(frames.slots[s]->samples.data())[pixel] - 64);
-    return sum / (2.5 * 100);
+    return sum * sequence.basis.scale / (2.5 * 100);
 }
 
 }  // namespace
 
-// Bound: 0, for what is not finite is masked where it is stored. The other pixels do not meet it: each is the plain sum, but
+// Bound: 0, for what is not finite is masked and filled from the other rows. The other pixels do not meet it: each is the plain sum, but
 // for four roundings to float: of the sum, 1 / (F t), its product with the scale, and the product of both.
 TEST(NonFiniteSource, marks_its_pixel_and_leaves_the_others_alone) {
     const Sequence sequence = s159_sequence();
