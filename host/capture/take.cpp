@@ -133,7 +133,7 @@ class TakeWriter {
             if (target.ok()) {
                 outcome.target = std::make_unique<Target>(std::move(*target));
                 outcome.target->index = frames->cycle;
-                outcome.detail.update(outcome.target->provenance);
+                if (outcome.target->provenance.is_object()) outcome.detail.update(outcome.target->provenance);
                 outcome.detail["saturated_pixels"] = count(mask_saturated, *outcome.target, report_.saturated_share);
                 outcome.detail["estimated_pixels"] = count(mask_estimated, *outcome.target, report_.estimated_share);
                 outcome.detail["unsolved_pixels"] = count(mask_unsolved, *outcome.target, report_.unsolved_share);

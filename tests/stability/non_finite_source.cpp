@@ -88,7 +88,7 @@ double weighted_sum(const Sequence& sequence, const CycleFrames& frames, int lam
 
 }  // namespace
 
-// Bound: 0, for what is not finite is masked where it is stored. The other pixels do not meet it: each is the plain sum, but
+// Bound: 0, for what is not finite is masked and filled from the other rows. The other pixels do not meet it: each is the plain sum, but
 // for four roundings to float: of the sum, 1 / (F t), its product with the scale, and the product of both.
 TEST(NonFiniteSource, marks_its_pixel_and_leaves_the_others_alone) {
     const Sequence sequence = s159_sequence();
