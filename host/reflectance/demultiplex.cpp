@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Two inversions: a plan of additions where the basis has a known structure (hadamard_plan.hpp), and for any other a
-// matrix product by OpenBLAS, in blocks of samples that stay in the second-level cache (159 rows x 256 samples x 4 bytes
+// A plan of additions where the basis has a known structure (hadamard_plan.hpp), a factor a row where each row is an image of
+// its own (single lamps), and for any other a matrix product by OpenBLAS, in blocks of samples that stay in the second-level cache (159 rows x 256 samples x 4 bytes
 // = 163 KB). Integer weights are exact in both: sums of whole numbers below 2^24 are exact in float, whatever their order,
 // and below 2^53 in double.
 #include "reflectance/demultiplex.hpp"
@@ -17,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
 
 namespace ols {
@@ -176,6 +177,7 @@ void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> ro
                            std::span<float* const> lamps, const DemultiplexOptions& options) {
     openblas_set_num_threads(1);  // blocks are what runs in parallel
     const InverseMatrix matrix(basis);
+    const bool one_row_each = is_one_image_a_row(basis);
     const auto factors = sample_factors(basis, samples, options);
     const auto make_worker = [&] {
         return [&, small = Block<float>(basis), large = Block<double>(basis),
@@ -186,6 +188,13 @@ void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> ro
             if constexpr (std::is_same_v<Sample, int32_t>) {
                 filled.fill(from, begin, count);
                 fits_float = largest_count(from, count) < matrix.counts_limit;
+            }
+            if (one_row_each) {
+                for (size_t i = 0; i < lamps.size(); ++i)
+                    for (size_t p = 0; p < count; ++p)
+                        lamps[i][begin + p] =
+                            float(matrix.doubles[i * rows.size() + i] * double(from[i][p])) * factors[begin + p];
+                return;
             }
             const auto store = [&](const auto& images) {
                 for (size_t i = 0; i < lamps.size(); ++i)
