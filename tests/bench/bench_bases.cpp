@@ -95,8 +95,8 @@ class CardTake {
     std::vector<std::vector<int32_t>> rows_;
 };
 
-constexpr const char* names[] = {"single", "triangle",    "triangle300", "s155",
-                                 "s159",   "hadamard156", "paley163",    "spherical_harmonics:10"};
+constexpr const char* names[] = {"single",      "triangle", "triangle300",           "planes156", "s155", "s159",
+                                 "hadamard156", "paley163", "spherical_harmonics:10"};
 constexpr size_t most_images = 156;
 
 }  // namespace
