@@ -40,6 +40,12 @@ def sequence_file(basis):
     return f"examples/sequence_{basis}.toml"
 
 
+def masked_samples(basis):
+    """A saturated highlight shows as white in the image of its own lamp; where every row shows many lamps, their images are
+    estimated, or the pixel would be black."""
+    return [] if basis in ("single", "triangle") else ["--estimate", "smooth"]
+
+
 class Demo:
     def __init__(self, out):
         self.out = out
@@ -71,7 +77,7 @@ class Demo:
                     BIN / "stagectl", "run", "--sequence", sequence_file(basis), "--stage", settings, *stage.devices(),
                     "--calibration", calibration, "--production", "demo", "--scene", "head", "--take", basis,
                     "--timecode", "01:00:00:00", "--cycles", CYCLES[model], "--frames", account,
-                    "-o", self.path(basis, model), "--json")
+                    *masked_samples(basis), "-o", self.path(basis, model), "--json")
                 self.takes[basis, model]["account"] = account
         stage.__exit__()
 
@@ -82,7 +88,7 @@ class Demo:
         for basis in OTHERS:
             with self.clock(f"record {basis}"):
                 run(BIN / "stagectl", "run", "--basis", basis, "--stage", STAGES["noisy"], *stage.devices(), "--calibration",
-                    self.out / "calibration_noisy", "-o", self.path(basis, "noisy"))
+                    self.out / "calibration_noisy", *masked_samples(basis), "-o", self.path(basis, "noisy"))
         stage.__exit__()
 
     def show(self):
