@@ -130,7 +130,7 @@ HWY_INLINE void find_sources(const CountPlane& source, const SlotMotion& motion,
         hn::StoreU(hn::DemoteTo(d16, at_pixel), d16, whole);
         const auto units = hn::NearestInt(hn::Mul(fraction, hn::Set(df, float(1 << one_log2))));
         hn::StoreU(hn::DemoteTo(d16, units), d16, weight);  // saturates
-        return hn::Ne(held, coordinate);                    // NaN is outside too
+        return hn::Not(hn::Eq(held, coordinate));           // NaN is outside, too
     };
     for (int k = 0; k < at_once; k += int(hn::Lanes(df))) {
         const size_t from = at + size_t(k);
