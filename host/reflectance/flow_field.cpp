@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// Resizing, concatenation and warping of and by flow fields.
+#include "reflectance/flow_field.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace ols {
+
+namespace {
+
+// A coordinate's place among samples of one row or column, edges held.
+struct Place {
+    int at;
+    float fraction;
+};
+
+Place place_of(float coordinate, int size) {
+    const float held = std::clamp(coordinate, 0.0f, float(size - 1));
+    const int at = std::min(int(held), std::max(size - 2, 0));
+    return {at, held - float(at)};
+}
+
+float bilinear(const std::vector<float>& plane, int width, int height, float x, float y) {
+    const Place px = place_of(x, width), py = place_of(y, height);
+    const float* row = &plane[size_t(py.at) * size_t(width) + size_t(px.at)];
+    const int right = width > 1 ? 1 : 0, down = height > 1 ? width : 0;
+    const float top = row[0] + px.fraction * (row[right] - row[0]);
+    const float bottom = row[down] + px.fraction * (row[down + right] - row[down]);
+    return top + py.fraction * (bottom - top);
+}
+
+// Keys' cubic convolution kernel, a = -1/2, for the samples at -1, 0, 1, 2 from a fraction t.
+void cubic_weights(float t, float (&w)[4]) {
+    const float t2 = t * t, t3 = t2 * t;
+    w[0] = -0.5f * t3 + t2 - 0.5f * t;
+    w[1] = 1.5f * t3 - 2.5f * t2 + 1;
+    w[2] = -1.5f * t3 + 2 * t2 + 0.5f * t;
+    w[3] = 0.5f * t3 - 0.5f * t2;
+}
+
+float cubic(const Image& image, float x, float y) {
+    const Place px = place_of(x, image.width), py = place_of(y, image.height);
+    float wx[4], wy[4];
+    cubic_weights(px.fraction, wx);
+    cubic_weights(py.fraction, wy);
+    float sum = 0;
+    for (int j = 0; j < 4; ++j) {
+        const float* row = &image.data[size_t(std::clamp(py.at + j - 1, 0, image.height - 1)) * size_t(image.width)];
+        float across = 0;
+        for (int i = 0; i < 4; ++i) across += wx[i] * row[std::clamp(px.at + i - 1, 0, image.width - 1)];
+        sum += wy[j] * across;
+    }
+    return sum;
+}
+
+}  // namespace
+
+FlowField resized(const FlowField& flow, int width, int height) {
+    FlowField out(width, height);
+    const float sx = float(flow.width) / float(width), sy = float(flow.height) / float(height);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const float fx = (float(x) + 0.5f) * sx - 0.5f, fy = (float(y) + 0.5f) * sy - 0.5f;
+            const size_t at = size_t(y) * size_t(width) + size_t(x);
+            out.u[at] = bilinear(flow.u, flow.width, flow.height, fx, fy) / sx;
+            out.v[at] = bilinear(flow.v, flow.width, flow.height, fx, fy) / sy;
+        }
+    return out;
+}
+
+FlowField concatenated(const FlowField& a, const FlowField& b) {
+    assert(a.width == b.width && a.height == b.height);
+    FlowField out(a.width, a.height);
+    for (int y = 0; y < a.height; ++y)
+        for (int x = 0; x < a.width; ++x) {
+            const size_t at = size_t(y) * size_t(a.width) + size_t(x);
+            const float fx = float(x) + a.u[at], fy = float(y) + a.v[at];
+            out.u[at] = a.u[at] + bilinear(b.u, b.width, b.height, fx, fy);
+            out.v[at] = a.v[at] + bilinear(b.v, b.width, b.height, fx, fy);
+        }
+    return out;
+}
+
+Image warped(const Image& image, const FlowField& flow, std::vector<unsigned char>* inside) {
+    assert(image.channels == 1 && image.width == flow.width && image.height == flow.height);
+    Image out(image.width, image.height, 1);
+    if (inside) inside->assign(flow.size(), 1);
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const size_t at = size_t(y) * size_t(image.width) + size_t(x);
+            const float fx = float(x) + flow.u[at], fy = float(y) + flow.v[at];
+            out.data[at] = cubic(image, fx, fy);
+            const bool in = fx >= 0 && fy >= 0 && fx <= float(image.width - 1) && fy <= float(image.height - 1);
+            if (inside && !in) (*inside)[at] = 0;
+        }
+    return out;
+}
+
+}  // namespace ols

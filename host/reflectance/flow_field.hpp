@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Flow fields: where each pixel of one image is found in another.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "image/frame.hpp"
+
+namespace ols {
+
+// from(x, y) looks like to(x + u, y + v), in pixels. Rows top to bottom.
+struct FlowField {
+    int width = 0, height = 0;
+    std::vector<float> u, v;
+
+    FlowField() = default;
+    FlowField(int w, int h) : width(w), height(h), u(size_t(w) * size_t(h)), v(size_t(w) * size_t(h)) {}
+    size_t size() const { return u.size(); }
+};
+
+// The flow at half or double resolution and the like: vectors scale with the image. Bilinear, edges held.
+FlowField resized(const FlowField& flow, int width, int height);
+
+// First a, then b: a + b where a leads. Where a leads outside, b's nearest edge counts.
+FlowField concatenated(const FlowField& a, const FlowField& b);
+
+// A one-channel image seen through a flow: out(x, y) = image(x + u, y + v) by cubic convolution (Keys 1981, a = -1/2), edges
+// held. `inside` (if given) becomes 0 where the flow leads outside the image, else 1.
+Image warped(const Image& image, const FlowField& flow, std::vector<unsigned char>* inside = nullptr);
+
+}  // namespace ols

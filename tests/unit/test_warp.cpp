@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+// The warp of integer counts against bilinear interpolation in double precision, on every SIMD path.
+// links: ols_reflectance
+#include "reflectance/warp.hpp"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "reflectance/masked_sample.hpp"
+#include "stage/lamps.hpp"
+
+using namespace ols;
+
+namespace {
+
+constexpr int16_t masked = masked_sample<int16_t>;
+
+struct Scene {
+    int width, height;
+    std::vector<int16_t> counts;
+    FlowField base, step;
+    float fraction = 0.3f;
+    int largest = 4095;
+    float tolerance_px = 0;
+
+    Scene(int w, int h, int most = 4095)
+        : width(w), height(h), counts(size_t(w) * size_t(h)), base(w, h), step(w, h), largest(most) {
+        std::mt19937 random(5);
+        for (auto& c : counts) c = int16_t(int(random() % unsigned(2 * most + 1)) - most);
+    }
+    // By x, y; shared out among base and step, of which either is a line only where `is_smooth`.
+    void set_motion(const std::function<Vec3(int, int)>& at, bool is_smooth = false) {
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const Vec3 d = at(x, y);
+                const size_t p = size_t(y) * size_t(width) + size_t(x);
+                step.u[p] = is_smooth ? 1 : float(x % 3) - 1;
+                step.v[p] = float(y % 2);
+                base.u[p] = float(d.x) - fraction * step.u[p];
+                base.v[p] = float(d.y) - fraction * step.v[p];
+            }
+    }
+    std::vector<int16_t> warped() const {
+        std::vector<int16_t> out(counts.size());
+        warp_counts({counts.data(), width, height, size_t(width), largest}, GroupMotion(base, step, tolerance_px),
+                    fraction, out.data(), size_t(width));
+        return out;
+    }
+    // By definition; NaN where it must be masked.
+    double truth(int x, int y) const {
+        const size_t p = size_t(y) * size_t(width) + size_t(x);
+        const double px = float(x) + (base.u[p] + fraction * step.u[p]),
+                     py = float(y) + (base.v[p] + fraction * step.v[p]);
+        if (!(px >= 0 && py >= 0 && px <= width - 1 && py <= height - 1)) return NAN;
+        const int ix = int(px), iy = int(py);
+        double sum = 0;
+        for (const int dy : {0, 1})
+            for (const int dx : {0, 1}) {
+                const double weight = (dx ? px - ix : 1 - (px - ix)) * (dy ? py - iy : 1 - (py - iy));
+                if (weight == 0) continue;
+                const int16_t c = counts[size_t(iy + dy) * size_t(width) + size_t(ix + dx)];
+                if (c == masked) return NAN;
+                sum += weight * c;
+            }
+        return sum;
+    }
+    void expect_true(double tolerance, int margin = 0) const {
+        const auto out = warped();
+        for (int y = margin; y < height - margin; ++y)
+            for (int x = margin; x < width - margin; ++x) {
+                const double wanted = truth(x, y);
+                const int16_t got = out[size_t(y) * size_t(width) + size_t(x)];
+                if (std::isnan(wanted))
+                    ASSERT_EQ(got, masked) << x << " " << y;
+                else
+                    ASSERT_NEAR(got, wanted, tolerance) << x << " " << y;
+            }
+    }
+};
+
+// A weight is off by 2^-16 at most, and by 2^-15 where it would be 1. With two more bits, the three interpolations round
+// by half a unit of 1/4 count each and may add 8190 2^-15 for the weights; the result rounds by half a count.
+constexpr double tolerance_12_bits = 0.5 + 3 * 0.125 + 3 * 8190 / 65536.0;
+constexpr double tolerance_14_bits = 0.5 + 3 * 0.5 + 3 * 32766 / 65536.0;
+
+class Warp : public testing::TestWithParam<int64_t> {
+  protected:
+    Warp() { hwy::SetSupportedTargetsForTest(GetParam()); }
+    ~Warp() override { hwy::SetSupportedTargetsForTest(0); }
+};
+INSTANTIATE_TEST_SUITE_P(, Warp, testing::ValuesIn(hwy::SupportedAndGeneratedTargets()),
+                         [](const auto& target) { return hwy::TargetName(target.param); });
+
+TEST_P(Warp, smooth_motion_is_bilinear_interpolation) {
+    Scene scene(83, 41);
+    scene.set_motion([](int x, int y) { return Vec3{2.3 + 0.02 * y, -1.4 + 0.03 * x, 0}; });
+    scene.expect_true(tolerance_12_bits);
+}
+
+TEST_P(Warp, wild_motion_is_bilinear_interpolation_too) {
+    Scene scene(64, 48);
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> any(-40, 40);
+    scene.set_motion([&](int, int) { return Vec3{any(random), any(random), 0}; });
+    scene.expect_true(tolerance_12_bits);
+}
+
+// On lines a position is off by 2^-10 pixels and the tolerance; the image has a slope of 100 counts a pixel at most.
+TEST_P(Warp, motion_on_lines_is_bilinear_interpolation_of_positions_nearby) {
+    Scene scene(176, 41);
+    for (int p = 0; p < 176 * 41; ++p)
+        scene.counts[size_t(p)] = int16_t(2000 * std::sin(p % 176 * 0.03) + 1000 * std::cos(p / 176 * 0.04));
+    scene.set_motion([](int x, int y) { return Vec3{2.3 + 0.02 * y + 0.3 * x, -1.4 + 0.03 * x, 0}; }, true);
+    scene.tolerance_px = 0.02f;
+    EXPECT_EQ(GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share(), 1);
+    scene.expect_true(tolerance_12_bits + 100 * (0.02 + 1 / 1024.0), 2);
+}
+
+TEST_P(Warp, an_edge_of_motion_within_eight_pixels_keeps_its_own_vectors) {
+    Scene scene(96, 20);
+    scene.set_motion([](int x, int) { return Vec3{x < 43 ? 0.25 : 3.5, 0.5, 0}; }, true);
+    scene.tolerance_px = 0.02f;
+    const double share = GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share();
+    EXPECT_GT(share, 0);
+    EXPECT_LT(share, 1);
+    for (auto& count : scene.counts) count = int16_t(1000 + count % 8);
+    scene.expect_true(tolerance_12_bits + 16 * (0.02 + 1 / 1024.0));
+}
+
+TEST_P(Warp, planes_narrower_than_a_register_work) {
+    for (const int width : {1, 2, 7, 8, 15, 16, 17}) {
+        Scene scene(width, 5);
+        scene.set_motion([](int, int) { return Vec3{0.6, 0.25, 0}; });
+        scene.expect_true(tolerance_12_bits);
+    }
+}
+
+TEST_P(Warp, counts_of_14_bits_do_not_overflow) {
+    Scene scene(40, 9, 16383);
+    scene.set_motion([](int x, int) { return Vec3{0.5, x * 0.01, 0}; });
+    scene.expect_true(tolerance_14_bits);
+}
+
+TEST_P(Warp, no_motion_changes_nothing_and_spreads_no_mask) {
+    Scene scene(50, 20);
+    for (size_t p = 0; p < scene.counts.size(); p += 11) scene.counts[p] = masked;
+    scene.fraction = 0;
+    EXPECT_EQ(scene.warped(), scene.counts);
+}
+
+TEST_P(Warp, a_masked_count_masks_what_it_has_a_part_in) {
+    Scene scene(40, 30);
+    for (size_t p = 5; p < scene.counts.size(); p += 97) scene.counts[p] = masked;
+    scene.set_motion([](int x, int y) { return Vec3{0.3 + 0.01 * y, 0.2 + 0.01 * x, 0}; });
+    scene.expect_true(tolerance_12_bits);
+}
+
+TEST_P(Warp, flow_that_is_no_number_masks) {
+    Scene scene(32, 4);
+    scene.base.u[3] = NAN;
+    scene.base.v[70] = INFINITY;
+    const auto out = scene.warped();
+    EXPECT_EQ(out[3], masked);
+    EXPECT_EQ(out[70], masked);
+}
+
+TEST(WarpPaths, give_the_same_bits) {
+    Scene scene(97, 33);
+    scene.set_motion([](int x, int y) { return Vec3{std::sin(x * 0.3) * 6, std::cos(y * 0.2) * 4, 0}; });
+    std::vector<std::vector<int16_t>> results;
+    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        results.push_back(scene.warped());
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    for (const auto& result : results) EXPECT_EQ(result, results[0]);
+}
+
+// Colours of a mosaic do not mix: planes of red only show red wherever they are moved from.
+TEST(ColorPlanes, take_every_second_vector_in_their_own_pixels) {
+    FlowField flow(5, 4);
+    for (size_t p = 0; p < flow.size(); ++p) flow.u[p] = float(p), flow.v[p] = -float(p);
+    const FlowField plane = of_color_plane(flow, 1, 0);
+    EXPECT_EQ(plane.width, 2);
+    EXPECT_EQ(plane.height, 2);
+    EXPECT_EQ(plane.u, (std::vector<float>{0.5f, 1.5f, 5.5f, 6.5f}));
+    EXPECT_EQ(plane.v[3], -6.5f);
+}
+
+// Rotation about a point, twice: concatenation is the rotation by both angles.
+TEST(Concatenation, of_two_rotations_is_their_rotation) {
+    const auto rotation = [](double angle) {
+        FlowField flow(64, 64);
+        for (int y = 0; y < 64; ++y)
+            for (int x = 0; x < 64; ++x) {
+                const double dx = x - 31.5, dy = y - 31.5;
+                flow.u[size_t(y * 64 + x)] = float(dx * std::cos(angle) - dy * std::sin(angle) - dx);
+                flow.v[size_t(y * 64 + x)] = float(dx * std::sin(angle) + dy * std::cos(angle) - dy);
+            }
+        return flow;
+    };
+    const FlowField sum = concatenated(rotation(0.1), rotation(0.05)), truth = rotation(0.15);
+    for (int y = 16; y < 48; ++y)
+        for (int x = 16; x < 48; ++x) {
+            ASSERT_NEAR(sum.u[size_t(y * 64 + x)], truth.u[size_t(y * 64 + x)], 1e-4);
+            ASSERT_NEAR(sum.v[size_t(y * 64 + x)], truth.v[size_t(y * 64 + x)], 1e-4);
+        }
+}
+
+}  // namespace
