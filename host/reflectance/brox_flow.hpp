@@ -25,7 +25,7 @@ struct FlowHint {
 struct BroxFlowOptions {
     FlowDetail detail;
     float gradient = 1;
-    float smoothness = 0.05f;
+    float smoothness = 0.8f;
     double ratio = 0.5;    // of a pyramid level's sides to those of the level before; the paper has 0.95
     int warps = 2;         // a level
     int finest_warps = 2;  // at the finest level, which costs as much as all others together

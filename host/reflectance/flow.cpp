@@ -91,6 +91,48 @@ Status check(const Image& from, const Image& to, const FlowField* initial) {
     return Done{};
 }
 
+Status check(const DisFlowOptions& o) {
+    if (o.finest_scale < 0 || o.patch_size < 4 || o.patch_stride < 1 || o.patch_stride > o.patch_size ||
+        o.iterations < 1)
+        return fail(
+            "flow: DIS needs finest_scale >= 0, patch_size >= 4, patch_stride from 1 to patch_size, iterations >= 1");
+    if (o.refinements < 0 || o.final_refinements < 0 || !(o.smoothness > 0 && o.brightness >= 0 && o.gradient >= 0))
+        return fail("flow: DIS needs refinements >= 0, smoothness > 0, weights of brightness and gradient >= 0");
+    return Done{};
+}
+
+Status check_detail(const FlowDetail& detail) {
+    if (!(detail.share >= 0 && detail.share <= 1) || detail.radius < 1 || !(detail.smoothing >= 0))
+        return fail("flow: detail needs a share from 0 to 1, a radius of at least 1 pixel, smoothing >= 0");
+    return Done{};
+}
+
+// What both of our methods need.
+template <typename Options>
+Status check_descent(const Options& o) {
+    if (o.warps < 1 || o.finest_warps < 1 || o.reweightings < 1 || o.sweeps < 1 || o.coarsest < 4 || o.finest_level < 0)
+        return fail(
+            "flow: warps, reweightings and sweeps must be at least 1, coarsest at least 4, finest_level at least 0");
+    if (!(o.smoothness > 0)) return fail("flow: smoothness must be above 0: else textureless pixels have no flow");
+    return check_detail(o.detail);
+}
+
+Status check(const RobustFlowOptions& o) {
+    if (!(o.data_sigma > 0 && o.flow_sigma > 0) || o.stages < 1)
+        return fail("flow: data_sigma and flow_sigma must be above 0, stages at least 1");
+    return check_descent(o);
+}
+
+Status check(const BroxFlowOptions& o) {
+    if (!(o.ratio >= 0.1 && o.ratio <= 0.98)) return fail("flow: the pyramid's ratio must be from 0.1 to 0.98");
+    if (!(o.gradient >= 0 && o.hint >= 0 && o.keep >= 0 && o.hint_radius > 0 && o.keep_threshold > 0))
+        return fail("flow: gradient, hint and keep must be at least 0, hint_radius and keep_threshold above 0");
+    for (const FlowHint& hint : o.hints)
+        if (!std::isfinite(hint.x) || !std::isfinite(hint.y) || !std::isfinite(hint.u) || !std::isfinite(hint.v))
+            return fail("flow: a hint has numbers that are not finite: leave it out");
+    return check_descent(o);
+}
+
 FlowField run(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
     return dis_flow(pair, options, initial);
 }
@@ -102,9 +144,19 @@ FlowField run(const FlowPair& pair, const BroxFlowOptions& options, const FlowFi
 }
 
 std::vector<std::pair<std::string, FlowOptions>> methods() {
-    return {{"dis-medium", {.method = DisFlowOptions{}}},
-            {"robust", {.method = RobustFlowOptions{}}},
-            {"brox", {.method = BroxFlowOptions{}}}};
+    BroxFlowOptions half, fine;
+    half.finest_level = 1;
+    fine.ratio = 0.8;
+    fine.warps = fine.finest_warps = 3;
+    return {
+        {"dis-ultrafast", {DisFlowOptions{.finest_scale = 2, .patch_stride = 4, .iterations = 12, .refinements = 0}}},
+        {"dis-fast", {DisFlowOptions{.finest_scale = 2, .patch_stride = 4, .iterations = 16}}},
+        {"brox-half", {half}},
+        {"dis-medium", {DisFlowOptions{}}},
+        {"brox", {BroxFlowOptions{}}},
+        {"robust", {RobustFlowOptions{}}},
+        {"dis-refined", {DisFlowOptions{.final_refinements = 5}}},
+        {"brox-fine", {fine}}};
 }
 
 }  // namespace
@@ -127,6 +179,8 @@ Result<FlowOptions> flow_method(const std::string& name) {
 Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOptions& options,
                                 const FlowField* initial) {
     if (Status fits = check(from, to, initial); !fits) return fits.error();
+    if (Status sane = std::visit([](const auto& method) { return check(method); }, options.method); !sane)
+        return sane.error();
     FlowPair pair{from, to, {}, {}};
     pair.from_seen = hide_unseen(pair.from, options.saturation);
     pair.to_seen = hide_unseen(pair.to, options.saturation);
@@ -136,7 +190,11 @@ Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOp
         std::fill(all.data.begin(), all.data.end(), 1.0f);
     }
     equalize_exposure(pair);
-    return std::visit([&](const auto& method) { return run(pair, method, initial); }, options.method);
+    try {
+        return std::visit([&](const auto& method) { return run(pair, method, initial); }, options.method);
+    } catch (const cv::Exception& e) {
+        return fail(std::string("flow: OpenCV refuses: ") + e.what());
+    }
 }
 
 std::vector<float> confidence(const FlowField& forward, const FlowField& backward) {

@@ -16,13 +16,13 @@
 namespace ols {
 
 struct FlowOptions {
-    std::variant<DisFlowOptions, RobustFlowOptions, BroxFlowOptions> method = RobustFlowOptions{};
+    std::variant<DisFlowOptions, RobustFlowOptions, BroxFlowOptions> method = BroxFlowOptions{};
     // Pixels at or above it are not seen, as those that are no number: they say nothing, their neighbours speak for them.
     // In the images' own unit.
     float saturation = std::numeric_limits<float>::infinity();
 };
 
-// The methods of docs/motion.md by name, from the fastest on: each is a point on the front of error and time.
+// The methods of docs/motion.md by name, from the fastest on.
 std::vector<std::string> flow_method_names();
 
 // Error: no such method; says which there are.

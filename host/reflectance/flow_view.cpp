@@ -199,10 +199,6 @@ void derivative_y(const PaddedPlane& plane, PaddedPlane& out) {
     hold_borders(out);
 }
 
-void warp_plane(const PaddedPlane& plane, const FlowField& flow, PaddedPlane& out, PaddedPlane& inside) {
-    HWY_DYNAMIC_DISPATCH(warp)(plane, flow, out, inside);
-}
-
 void split(const float* rows, int width, CheckeredPlane& out) {
     for (int y = 0; y < out.rows; ++y) HWY_DYNAMIC_DISPATCH(split_row)(rows + ptrdiff_t(y) * width, width, y, out);
 }

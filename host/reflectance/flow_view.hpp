@@ -30,9 +30,6 @@ class FlowViewer {
     FlowView view_;
 };
 
-// out(x, y) = plane(x + u, y + v) by cubic convolution; `inside` is 1, or 0 where the flow leads outside.
-void warp_plane(const PaddedPlane& plane, const FlowField& flow, PaddedPlane& out, PaddedPlane& inside);
-
 // The derivative along rows and along columns, five points wide; its border holds, too.
 void derivative_x(const PaddedPlane& plane, PaddedPlane& out);
 void derivative_y(const PaddedPlane& plane, PaddedPlane& out);
