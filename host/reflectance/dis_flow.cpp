@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// Images to 8 bits, OpenCV's call, and the flow back to planes.
+#include "reflectance/dis_flow.hpp"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <vector>
+
+namespace ols {
+
+namespace {
+
+cv::Mat mat_of(const Image& image) {
+    return cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.data.data()));
+}
+
+// The range of both images' brightness, but for the thousandth at either end, onto 0 to 255.
+void quantize(const FlowPair& pair, cv::Mat& from, cv::Mat& to) {
+    std::vector<float> sample;
+    sample.reserve(2 * pair.from.data.size() / 7 + 2);
+    for (const Image* image : {&pair.from, &pair.to})
+        for (size_t p = 0; p < image->data.size(); p += 7) sample.push_back(image->data[p]);
+    const size_t tail = sample.size() / 1000;
+    std::nth_element(sample.begin(), sample.begin() + ptrdiff_t(tail), sample.end());
+    const float darkest = sample[tail];
+    std::nth_element(sample.begin(), sample.end() - 1 - ptrdiff_t(tail), sample.end());
+    const float range = sample[sample.size() - 1 - tail] - darkest;
+    const double scale = range > 0 ? 255 / double(range) : 0;
+    mat_of(pair.from).convertTo(from, CV_8U, scale, -darkest * scale);
+    mat_of(pair.to).convertTo(to, CV_8U, scale, -darkest * scale);
+}
+
+}  // namespace
+
+FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
+    cv::Mat from, to, vectors;
+    quantize(pair, from, to);
+    const int width = from.cols, height = from.rows;
+    const cv::Ptr<cv::DISOpticalFlow> dis = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
+    dis->setFinestScale(options.finest_scale);
+    dis->setPatchSize(options.patch_size);
+    dis->setPatchStride(options.patch_stride);
+    dis->setGradientDescentIterations(options.iterations);
+    dis->setVariationalRefinementIterations(options.refinements);
+    dis->setVariationalRefinementAlpha(options.smoothness);
+    dis->setVariationalRefinementDelta(options.brightness);
+    dis->setVariationalRefinementGamma(options.gradient);
+    if (initial) {
+        const std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, const_cast<float*>(initial->u.data())),
+                                             cv::Mat(height, width, CV_32F, const_cast<float*>(initial->v.data()))};
+        cv::merge(planes, vectors);
+    }
+    dis->calc(from, to, vectors);
+    FlowField flow(width, height);
+    std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, flow.u.data()),
+                                   cv::Mat(height, width, CV_32F, flow.v.data())};
+    cv::split(vectors, planes);
+    if (options.final_refinements > 0) {
+        const cv::Ptr<cv::VariationalRefinement> refinement = cv::VariationalRefinement::create();
+        refinement->setFixedPointIterations(options.final_refinements);
+        refinement->setAlpha(options.smoothness);
+        refinement->setDelta(options.brightness);
+        refinement->setGamma(options.gradient);
+        refinement->calcUV(from, to, planes[0], planes[1]);
+    }
+    return flow;
+}
+
+}  // namespace ols

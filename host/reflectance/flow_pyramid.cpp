@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// Blurring and resampling of images; from level to level.
+#include "reflectance/flow_pyramid.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace ols {
+
+namespace {
+
+cv::Mat mat_of(const Image& image) {
+    return cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.data.data()));
+}
+
+Image reduced(const Image& image, double ratio) {
+    // What half resolution cannot carry is taken out by sigma 0.9; a level of another ratio widens the blur of the one before
+    // by as much as its pixels grow: sigma^2 goes as 1 / ratio^2 - 1.
+    const double sigma = 0.9 * std::sqrt((1 / (ratio * ratio) - 1) / 3);
+    const auto shrunk = [&](int side) { return std::max(1, int(std::lround(side * ratio))); };
+    cv::Mat blurred;
+    cv::GaussianBlur(mat_of(image), blurred, {0, 0}, sigma, sigma, cv::BORDER_REPLICATE);
+    Image out(shrunk(image.width), shrunk(image.height), 1);
+    cv::Mat small = mat_of(out);
+    cv::resize(blurred, small, small.size(), 0, 0, cv::INTER_LINEAR);
+    return out;
+}
+
+Image smoothed(const Image& image, float sigma) {
+    Image out(image.width, image.height, 1);
+    cv::Mat target = mat_of(out);
+    cv::GaussianBlur(mat_of(image), target, {0, 0}, sigma, sigma, cv::BORDER_REPLICATE);
+    return out;
+}
+
+// In place, both on one scale: a subject that enters must not change that of what was there. Images without detail become zero.
+void take_detail(FlowPair& pair, const FlowDetail& detail) {
+    const int side = 2 * detail.radius + 1;
+    double variance = 0;
+    for (Image* image : {&pair.from, &pair.to}) {
+        cv::Mat fine = mat_of(*image), coarse;
+        cv::boxFilter(fine, coarse, -1, {side, side}, {-1, -1}, true, cv::BORDER_REPLICATE);
+        cv::boxFilter(coarse, coarse, -1, {side, side}, {-1, -1}, true, cv::BORDER_REPLICATE);
+        cv::scaleAdd(coarse, -detail.share, fine, fine);
+        cv::Scalar mean, deviation;
+        cv::meanStdDev(fine, mean, deviation);
+        variance += deviation[0] * deviation[0] / 2;
+    }
+    const double scale = variance > 0 ? 1 / std::sqrt(variance) : 0;
+    constexpr double step = 1 << 6;  // rounds to some 4e-6: what filters leave where nothing is becomes zero
+    for (Image* image : {&pair.from, &pair.to}) {
+        cv::Mat fine = mat_of(*image);
+        fine.convertTo(fine, -1, scale, step);
+        cv::subtract(fine, cv::Scalar(step), fine);
+    }
+}
+
+FlowPair reduced(const FlowPair& pair, double ratio) {
+    const auto seen = [&](const Image& mask) { return mask.data.empty() ? Image() : reduced(mask, ratio); };
+    return {reduced(pair.from, ratio), reduced(pair.to, ratio), seen(pair.from_seen), seen(pair.to_seen)};
+}
+
+}  // namespace
+
+FlowPyramid flow_pyramid(const FlowPair& pair, double ratio, int coarsest, const FlowDetail& detail) {
+    assert(pair.from.channels == 1 && pair.to.channels == 1);
+    assert(pair.from.width == pair.to.width && pair.from.height == pair.to.height && ratio > 0 && ratio < 1);
+    FlowPyramid pyramid{.levels = {pair}, .ratio = ratio};
+    if (detail.smoothing > 0)
+        for (Image* image : {&pyramid.levels[0].from, &pyramid.levels[0].to})
+            *image = smoothed(*image, detail.smoothing);
+    for (;;) {
+        const FlowPair& last = pyramid.levels.back();
+        const int side = std::min(last.from.width, last.from.height);
+        const int next = int(std::lround(side * ratio));
+        if (next < coarsest || next == side) break;
+        pyramid.levels.push_back(reduced(last, ratio));
+    }
+    for (FlowPair& level : pyramid.levels) take_detail(level, detail);
+    return pyramid;
+}
+
+FlowField coarse_to_fine(const FlowPyramid& pyramid, int finest_level, const FlowField* initial,
+                         const SolveLevel& solve) {
+    const auto& levels = pyramid.levels;
+    const size_t finest = std::min(size_t(finest_level), levels.size() - 1);
+    size_t level = levels.size() - 1;
+    FlowField flow(levels[level].from.width, levels[level].from.height);
+    if (initial) {
+        const size_t octave = size_t(std::ceil(std::log(0.5) / std::log(pyramid.ratio) - 1e-9));
+        level = std::min(level, finest + octave);
+        flow = *initial;
+    }
+    for (;; --level) {
+        flow = solve(level, resized(flow, levels[level].from.width, levels[level].from.height));
+        if (level == finest) break;
+    }
+    return resized(flow, levels[0].from.width, levels[0].from.height);
+}
+
+void median_filter(FlowField& flow) {
+    for (std::vector<float>* plane : {&flow.u, &flow.v}) {
+        cv::Mat filtered(flow.height, flow.width, CV_32F);
+        cv::medianBlur(cv::Mat(flow.height, flow.width, CV_32F, plane->data()), filtered, 5);
+        std::copy_n(filtered.ptr<float>(), plane->size(), plane->begin());
+    }
+}
+
+}  // namespace ols
