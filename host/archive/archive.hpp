@@ -34,6 +34,7 @@ enum MaskBit : uint32_t {
     mask_clamped = 8,     // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
     mask_estimated = 16,  // what was left did not determine the lamp values: a prior did, which the provenance names
     mask_unsolved = 32,   // nothing did; the lamp values are 0
+    mask_misaligned = 64,  // motion compensation failed: `confidence` is below one half
 };
 
 // One output frame of one camera: all OLAT values. Planes are row-major, top to bottom.
@@ -48,6 +49,9 @@ struct Target {
     // [y * width + x]: noise variance of a lamp value over what it is with no sample masked, mean over lamps; 0 where not
     // solved. Empty if no sample of the target was filled in.
     std::vector<float> noise_gain;
+    // [y * width + x]: how well the flow that aligned this pixel's samples leads back to where it came from, 0 to 1, the
+    // least of all (reflectance/flow.hpp, confidence()). Empty if nothing was aligned.
+    std::vector<float> confidence;
     std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
     nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
 

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Align: brings the calibrated samples of a slot to the target's time, before they are demultiplexed.
+// Align: brings the calibrated samples of a slot to the target's time, before they are demultiplexed (Wenger section 6).
 #pragma once
 
 #include <cstdint>
 #include <span>
+#include <vector>
+
+#include "capture/color_planes.hpp"
+#include "reflectance/tracking_flows.hpp"
+#include "reflectance/warp.hpp"
 
 namespace ols {
 
@@ -11,5 +16,37 @@ namespace ols {
 // zero. For a subject that does not move, aligned samples are the camera's own, whole counts less a whole black level,
 // and pass unchanged. |samples| < 2^31.
 void align_samples(std::span<const float> samples, std::span<int32_t> aligned);
+
+// A pixel whose confidence (flow.hpp) is less has a flow that misses by more than is allowed.
+constexpr float trusted_confidence = 0.5f;
+
+// Where a target's pixels are found at other times, made ready for the colour planes of its frames. What leads outside the
+// image is held at its edge, and not trusted.
+class Alignment {
+  public:
+    // `path` has the target's instant among its knots. line_tolerance_px: GroupMotion's.
+    Alignment(const MotionPath& path, int width, int height, Cfa cfa, float line_tolerance_px, int threads);
+
+    // Between two knots the subject moves evenly; beyond the first and the last it goes on as before. A path of a single
+    // knot says nothing of motion: one interval, in which all stands still and nothing is trusted.
+    struct Place {
+        size_t interval = 0;
+        float fraction = 0;  // of the interval that has passed; below 0 or above 1 beyond
+    };
+    Place place_of(double tick) const;
+
+    const GroupMotion& motion(size_t interval, size_t plane) const { return intervals_[interval].planes[plane]; }
+    // Of each pixel of the target, the lower of the interval's two knots.
+    const std::vector<float>& confidence(size_t interval) const { return intervals_[interval].confidence; }
+    size_t intervals() const { return intervals_.size(); }
+
+  private:
+    struct Interval {
+        double first_tick, last_tick;
+        std::vector<GroupMotion> planes;  // by color_places()
+        std::vector<float> confidence;
+    };
+    std::vector<Interval> intervals_;
+};
 
 }  // namespace ols

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "archive/archive.hpp"
+#include "capture/aligned_rows.hpp"
 #include "reflectance/row_filler.hpp"
 #include "stage/calibration.hpp"
 #include "stage/sequence.hpp"
@@ -27,6 +29,13 @@ std::vector<int> missing_basis_slots(const CycleFrames& frames, const Sequence& 
 struct DevelopOptions {
     Estimate estimate = Estimate::none;
     std::vector<LightPosition> lamps;  // of the sphere; for an estimate
+    int threads = 0;                   // 0: as many as there are processors. Any number gives the same bits.
+};
+
+// The rows of a basis, brought to the target's time.
+struct AlignedFrames {
+    std::variant<AlignedRows<int16_t, int16_t>, AlignedRows<float, int32_t>, AlignedRows<float, float>> rows;
+    std::shared_ptr<const Frame> like;  // any of them
 };
 
 // Inverts cycles into r (docs/architecture.md, "Units"). The whole part of the black level is subtracted before the
@@ -47,10 +56,15 @@ class Developer {
               DevelopOptions options = {});
     ~Developer();
 
-    // Error: slots are missing that the others cannot replace; it names them and says what to do.
+    // Error: slots are missing that the others cannot replace; it names them (`missing_slots`) and says what to do.
     Result<Target> develop(const CycleFrames& frames);
+    Result<Target> develop(const RowFrames& rows, const std::vector<int>& missing_slots);
+    // The target has a confidence, and mask_misaligned where it is below trusted_confidence.
+    Result<Target> develop(const AlignedFrames& frames, const std::vector<int>& missing_slots);
 
   private:
+    template <typename Rows>
+    Result<Target> invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots);
     FillCache& fills();  // made when the first sample is masked
 
     const Sequence& sequence_;

@@ -61,7 +61,7 @@ void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Ba
     for (const auto& frame : frames) {
         load_frame(*frame, band, black, clipped_stay, out.data(), masked.data());
         for (size_t p = 0; p < out.size(); ++p) {
-            if (out[p] == masked_sample<Sum> || std::isnan(float(out[p]))) continue;
+            if (is_masked(out[p])) continue;
             sums[p] += float(out[p]);
             counts[p] += 1;
         }
@@ -85,28 +85,28 @@ std::vector<Sum*> RowBand<Sum>::pointers() {
 }
 
 template <typename Sum>
-RowBand<Sum> load_row_band(const RowFrames& frames, const Band& band, const Image& black, bool clipped_stay) {
+RowBand<Sum> RecordedRows<Sum>::load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const {
     RowBand<Sum> loaded;
-    loaded.rows.assign(frames.size(), std::vector<Sum>(band.samples()));
+    loaded.rows.assign(rows.size(), std::vector<Sum>(band.samples()));
     loaded.masked.assign(band.samples(), 0);
-    const auto shown = std::find_if(frames.begin(), frames.end(), [](const auto& some) { return !some.empty(); });
-    const auto level = prepare_black(loaded, band, black, shown->front()->white);
-    for (size_t row = 0; row < frames.size(); ++row) {
-        if (frames[row].empty()) {
+    const auto level = prepare_black(loaded, band, black, like.white);
+    for (size_t row = 0; row < rows.size(); ++row) {
+        if (rows[row].empty()) {
             std::fill(loaded.rows[row].begin(), loaded.rows[row].end(), masked_sample<Sum>);
             for (uint8_t& mark : loaded.masked) mark |= mask_missing;
-        } else if (frames[row].size() == 1) {
-            load_frame(*frames[row][0], band, level, clipped_stay, loaded.rows[row].data(), loaded.masked.data());
+        } else if (rows[row].size() == 1) {
+            load_frame(*rows[row][0], band, level, clipped_stay, loaded.rows[row].data(), loaded.masked.data());
         } else {
-            load_mean(frames[row], band, level, clipped_stay, loaded.rows[row], loaded.masked);
+            load_mean(rows[row], band, level, clipped_stay, loaded.rows[row], loaded.masked);
         }
     }
     return loaded;
 }
 
+template struct RowBand<int16_t>;
 template struct RowBand<int32_t>;
 template struct RowBand<float>;
-template RowBand<int32_t> load_row_band(const RowFrames&, const Band&, const Image&, bool);
-template RowBand<float> load_row_band(const RowFrames&, const Band&, const Image&, bool);
+template struct RecordedRows<int32_t>;
+template struct RecordedRows<float>;
 
 }  // namespace ols

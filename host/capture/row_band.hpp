@@ -37,9 +37,15 @@ struct RowBand {
     std::vector<Sum*> pointers();
 };
 
-// The mean of each row's frames, rounded to whole counts for int32_t, without samples at or above white or not finite; a
-// sample that no frame has is masked. With `clipped_stay` saturated samples count like others, marked all the same.
-template <typename Sum>
-RowBand<Sum> load_row_band(const RowFrames& frames, const Band& band, const Image& black, bool clipped_stay);
+// The rows of a basis as they were recorded: the mean of each row's frames, rounded to whole counts for int32_t, without
+// samples at or above white or not finite; a sample that no frame has is masked.
+template <typename Summed>
+struct RecordedRows {
+    using Sum = Summed;
+    RowFrames rows;
+
+    // `like`: any of the frames. With `clipped_stay` saturated samples count like others, marked all the same.
+    RowBand<Sum> load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const;
+};
 
 }  // namespace ols

@@ -15,6 +15,12 @@ constexpr Sample masked_sample = std::numeric_limits<Sample>::lowest();
 template <>
 inline constexpr float masked_sample<float> = std::numeric_limits<float>::quiet_NaN();
 
+template <typename Sample>
+bool is_masked(Sample sample) {
+    if constexpr (std::numeric_limits<Sample>::has_quiet_NaN) return sample != sample;
+    return sample == masked_sample<Sample>;
+}
+
 // Fills the masked samples of a tile before it is inverted. Called from several threads at once, for tiles in any order:
 // what it writes may depend on nothing but the tile.
 class SampleFiller {

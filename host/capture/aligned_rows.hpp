@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Aligned rows: the rows of a basis, each from frames of its own times, as they would have been at the target's.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "capture/align.hpp"
+#include "capture/color_planes.hpp"
+#include "capture/row_band.hpp"
+
+namespace ols {
+
+// Sample: of the planes that are warped. Sum: of the rows; from float samples to int32_t they are rounded, half away from
+// zero.
+template <typename Sample, typename Summed>
+struct AlignedRows {
+    using Sum = Summed;
+    struct Source {
+        std::shared_ptr<const ColorPlanes<Sample>> planes;
+        Alignment::Place place;
+    };
+    std::vector<std::vector<Source>> rows;  // by basis row; none where it was lost
+    std::shared_ptr<const Alignment> alignment;
+    // Whether samples of pixels that are not trusted are masked, for an estimate to fill in. Otherwise they stay as they
+    // are: rows that lost a whole group of slots determine no lamp.
+    bool masks_untrusted = false;
+    int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
+
+    // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` what saturated counts as white.
+    // Marks mask_saturated, and mask_missing where motion led outside the frame or the row was lost.
+    RowBand<Sum> load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const;
+
+    // Of each pixel, the least of all intervals that frames are taken from.
+    std::vector<float> confidence() const;
+
+  private:
+    void mark(size_t row, const Band& band, bool clipped_stay, RowBand<Sum>& loaded, std::span<uint8_t> marks) const;
+};
+
+}  // namespace ols

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Colour planes: a frame's samples above black, each colour of a mosaic by itself, so that they can be interpolated.
+#pragma once
+
+#include <vector>
+
+#include "image/frame.hpp"
+#include "reflectance/warp.hpp"
+
+namespace ols {
+
+// One sample in every step_x-th column and step_y-th row of the frame, from (first_x, first_y) on: what one colour of a
+// mosaic sees. `channel` of the samples of a pixel.
+struct ColorPlace {
+    int first_x = 0, first_y = 0, step = 1, channel = 0;
+
+    int width(int frame_width) const { return (frame_width - first_x + step - 1) / step; }
+    int height(int frame_height) const { return (frame_height - first_y + step - 1) / step; }
+};
+
+// Four places of a mosaic, three of rgb, one of monochrome.
+std::vector<ColorPlace> color_places(Cfa cfa);
+
+// Sample: int16_t, for cameras whose white lies at most 16383 counts above black, or float.
+template <typename Sample>
+struct ColorPlanes {
+    struct Plane {
+        int width = 0, height = 0;
+        std::vector<Sample> samples;  // row by row, counts above the whole part of black
+    };
+    std::vector<Plane> planes;  // by color_places()
+    bool any_masked = false;
+};
+
+// Whether counts of this frame fit ColorPlanes<int16_t>.
+bool fits_shorts(const Frame& frame, const Image& black);
+
+// masked_sample<Sample> where a sample is at or above white or not finite. For int16_t the frame fits_shorts().
+template <typename Sample>
+ColorPlanes<Sample> color_planes(const Frame& frame, const Image& black);
+
+// What motion is found in: one channel of counts above black over the flat, so that every pixel of a mosaic counts alike:
+// each is the mean over its neighbourhood of 3 x 3 with weights 1 2 1, in which a quarter is red, a half green, a quarter
+// blue wherever it lies. Monochrome frames pass unsmoothed, rgb becomes (R + 2 G + B) / 4. NaN where a sample of it is
+// saturated or not finite.
+Image tracking_image(const Frame& frame, const Image& black, const Image& flat);
+
+}  // namespace ols

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// Lazy basis: which instants of a take become targets, and which frames serve each of them (Wenger section 6.1).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "result.hpp"
+#include "stage/sequence.hpp"
+
+namespace ols {
+
+// Below, frames are numbered by the triggers of a take: cycle * slots of a cycle + slot.
+
+// The tracking frames of a second, on average over the cycle.
+double tracking_rate_hz(const Sequence& sequence);
+
+// At every how manieth tracking frame a target stands for `fps` targets a second: with the paper's 120 tracking frames a
+// second, 2, 4 and 5 for 60, 30 and 24. Errors: the tracking rate is no multiple of fps (to a thousandth); names the rates
+// there are. No tracking slots.
+Result<int> tracking_frames_a_target(const Sequence& sequence, double fps);
+
+// The tracking frames that become targets: from the first one on around which a whole basis was recorded.
+std::vector<uint64_t> target_numbers(const Sequence& sequence, int every);
+
+// The frames that a target's samples come from. Of each basis slot the frame nearest in time, half a cycle away at most, the
+// earlier of two: for the paper's cycle of 1/12 s from 1/24 s before the target to 1/24 s after. Where it was lost, the
+// same slot's frame in the cycle on the target's other side, a cycle away at most.
+struct LazyBasis {
+    struct Choice {
+        uint64_t number = 0;
+        int slot = 0;             // of the cycle
+        bool is_stand_in = false;  // for a lost one
+    };
+    uint64_t target = 0;
+    std::vector<Choice> choices;  // in slot order
+    std::vector<int> lost;        // slots of the basis that neither cycle has a frame of
+};
+
+LazyBasis gather_basis(const Sequence& sequence, uint64_t target, const std::function<bool(uint64_t)>& is_recorded);
+
+// The frames that gather_basis() may ask for, and the tracking frames around them, both ends included.
+struct FrameRange {
+    uint64_t first = 0, last = 0;
+};
+FrameRange frames_around(const Sequence& sequence, uint64_t target);
+
+}  // namespace ols

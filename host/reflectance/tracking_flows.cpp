@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: MIT
+// Walks from the instant to the tracking frames on either side, one flow after the other; both sides run at once.
+#include "reflectance/tracking_flows.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "parallel.hpp"
+
+namespace ols {
+
+namespace {
+
+// A mean over reduction x reduction pixels; those without a number do not count.
+Image shrunk(const Image& image, int reduction) {
+    if (reduction == 1) return image;
+    const auto part = [&](int side) { return (side + reduction - 1) / reduction; };
+    Image out(part(image.width), part(image.height), 1);
+    for (int y = 0; y < out.height; ++y)
+        for (int x = 0; x < out.width; ++x) {
+            float sum = 0, count = 0;
+            for (int j = y * reduction; j < std::min((y + 1) * reduction, image.height); ++j)
+                for (int i = x * reduction; i < std::min((x + 1) * reduction, image.width); ++i)
+                    if (const float v = image.at(i, j); std::isfinite(v)) sum += v, ++count;
+            out.at(x, y) = count > 0 ? sum / count : std::numeric_limits<float>::quiet_NaN();
+        }
+    return out;
+}
+
+FlowField scaled(const FlowField& flow, double factor) {
+    FlowField out = flow;
+    for (std::vector<float>* plane : {&out.u, &out.v})
+        for (float& v : *plane) v = float(factor * double(v));
+    return out;
+}
+
+Status first_error(std::span<const std::string> errors) {
+    for (const std::string& error : errors)
+        if (!error.empty()) return fail(error);
+    return Done{};
+}
+
+MotionKnot still(double tick, int width, int height) {
+    MotionKnot knot{tick, FlowField(width, height), {}};
+    knot.confidence.assign(knot.flow.size(), 1.0f);
+    return knot;
+}
+
+}  // namespace
+
+SplitFlow split(const FlowField& between, double share) {
+    constexpr int iterations = 5;
+    FlowField back(between.width, between.height);  // from the instant to the first: -share between(x')
+    for (int i = 0; i < iterations; ++i) {
+        // concatenated() adds `back` to what it reads of `between` at x + back.
+        const FlowField sum = concatenated(back, between);
+        for (size_t p = 0; p < back.size(); ++p) {
+            back.u[p] = float(-share) * (sum.u[p] - back.u[p]);
+            back.v[p] = float(-share) * (sum.v[p] - back.v[p]);
+        }
+    }
+    return {back, scaled(back, -(1 - share) / share)};
+}
+
+TrackingFlows::TrackingFlows(TrackingFlowOptions options) : options_(std::move(options)) {
+    assert(options_.reduction == 1 || options_.reduction == 2 || options_.reduction == 4);
+}
+
+Status TrackingFlows::add(double tick, const Image& image) {
+    assert(image.channels == 1 && (frames_.empty() || tick > frames_.back().tick));
+    Image small = shrunk(image, options_.reduction);
+    if (frames_.empty()) width_ = small.width, height_ = small.height;
+    if (small.width != width_ || small.height != height_) return fail("tracking frames differ in size");
+    if (std::min(width_, height_) < 16)
+        return fail("frames of " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                    " pixels are too small for motion compensation: at least " +
+                    std::to_string(16 * options_.reduction) + " a side");
+    frames_.push_back({tick, std::move(small), {}, {}});
+    return Done{};
+}
+
+void TrackingFlows::forget_before(double tick) {
+    while (frames_.size() > 1 && frames_[1].tick <= tick) frames_.pop_front();
+}
+
+Status TrackingFlows::find_local_flows(size_t first, size_t last) {
+    struct Task {
+        const Image *from, *to;
+        std::optional<FlowField>* flow;
+    };
+    std::vector<Task> tasks;
+    for (size_t i = first; i < last; ++i) {
+        Frame &a = frames_[i], &b = frames_[i + 1];
+        if (!a.forward) tasks.push_back({&a.image, &b.image, &a.forward});
+        if (!a.backward) tasks.push_back({&b.image, &a.image, &a.backward});
+    }
+    std::vector<std::string> errors(tasks.size());
+    for_each_index(options_.threads, tasks.size(), [&](size_t t) {
+        auto flow = estimate_flow(*tasks[t].from, *tasks[t].to, options_.local);
+        if (flow.ok())
+            *tasks[t].flow = std::move(*flow);
+        else
+            errors[t] = flow.error().message;
+    });
+    return first_error(errors);
+}
+
+// Adds the knots from frame `at`, where `flow` leads and `back` comes from, to frame `end`. `reference` is the image that
+// long-range flows are refined against, null where there is none.
+Status TrackingFlows::walk(const Image* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
+                           MotionPath& path) const {
+    for (;;) {
+        path.push_back({frames_[at].tick, flow, confidence(flow, back)});
+        if (at == end) return Done{};
+        const Frame& pair = frames_[direction > 0 ? at : at - 1];
+        const FlowField &away = *(direction > 0 ? pair.forward : pair.backward),
+                        &home = *(direction > 0 ? pair.backward : pair.forward);
+        flow = concatenated(flow, away);
+        back = concatenated(home, back);
+        at = direction > 0 ? at + 1 : at - 1;
+        if (!reference || !options_.refinement) continue;
+        auto refined = estimate_flow(*reference, frames_[at].image, *options_.refinement, &flow);
+        if (!refined.ok()) return refined.error();
+        flow = std::move(*refined);
+    }
+}
+
+Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
+    if (frames_.empty()) return fail("no tracking frame of the take was recorded: motion cannot be compensated");
+    if (instant < frames_.front().tick || instant > frames_.back().tick)
+        return MotionPath{still(instant, width_, height_)};
+    const auto last_until = [&](double tick) {  // the first frame where all are later
+        size_t i = 0;
+        while (i + 1 < frames_.size() && frames_[i + 1].tick <= tick) ++i;
+        return i;
+    };
+    const size_t before = last_until(instant);
+    const size_t first = std::min(before, last_until(from));
+    size_t last = last_until(to);
+    if (frames_[last].tick < to && last + 1 < frames_.size()) ++last;
+    const bool is_frame = frames_[before].tick == instant;
+    last = std::max(last, is_frame ? before : before + 1);
+    if (Status status = find_local_flows(first, last); !status.ok()) return status.error();
+
+    const Image* const reference = is_frame ? &frames_[before].image : nullptr;
+    SplitFlow parts;
+    double share = 0;
+    if (!is_frame) {
+        share = (instant - frames_[before].tick) / (frames_[before + 1].tick - frames_[before].tick);
+        parts = split(*frames_[before].forward, share);
+    }
+    MotionPath sides[2];
+    std::string errors[2];
+    const auto take = [&](size_t side, const Image* image, size_t end, size_t at, FlowField flow, FlowField back) {
+        const Status walked = walk(image, side == 0 ? -1 : 1, end, at, std::move(flow), std::move(back), sides[side]);
+        if (!walked.ok()) errors[side] = walked.error().message;
+    };
+    for_each_index(options_.threads, 2, [&](size_t side) {
+        if (is_frame && side == 0 && before > first)
+            take(0, reference, first, before - 1, *frames_[before - 1].backward, *frames_[before - 1].forward);
+        if (is_frame && side == 1 && before < last)
+            take(1, reference, last, before + 1, *frames_[before].forward, *frames_[before].backward);
+        if (!is_frame && side == 0)
+            take(0, nullptr, first, before, parts.to_first, scaled(*frames_[before].forward, share));
+        if (!is_frame && side == 1)
+            take(1, nullptr, last, before + 1, parts.to_second, scaled(*frames_[before].backward, 1 - share));
+    });
+    if (Status done = first_error(errors); !done.ok()) return done.error();
+    MotionPath path(std::make_move_iterator(sides[0].rbegin()), std::make_move_iterator(sides[0].rend()));
+    path.push_back(still(instant, width_, height_));
+    path.insert(path.end(), std::make_move_iterator(sides[1].begin()), std::make_move_iterator(sides[1].end()));
+    return path;
+}
+
+}  // namespace ols

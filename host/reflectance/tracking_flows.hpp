@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Tracking flows: where the subject of one instant is found at the tracking frames around it (Wenger section 6).
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "reflectance/flow.hpp"
+#include "result.hpp"
+
+namespace ols {
+
+// What the flow between tracking frames is made with.
+struct TrackingFlowOptions {
+    FlowOptions local;  // between neighbouring tracking frames, both ways
+    // Of a long-range flow, which a concatenation begins: directly between the target's tracking frame and one that is
+    // farther away. Nothing: concatenations stand as they are.
+    std::optional<FlowOptions> refinement;
+    int reduction = 1;  // 1, 2, 4: flow is found in images of this fraction of their size
+    int threads = 0;    // 0: as many as there are processors. Any number gives the same bits.
+};
+
+// A flow from an instant to another one. Fields have the size of the images divided by `reduction`, rounded up, and vectors
+// are in their pixels.
+struct MotionKnot {
+    double tick = 0;
+    FlowField flow;
+    std::vector<float> confidence;  // of each pixel (flow.hpp, confidence())
+};
+
+// Ascending in time, the instant itself among them, with zero flow and confidence 1. Between two knots the subject moves at
+// an even pace.
+using MotionPath = std::vector<MotionKnot>;
+
+// Takes the tracking frames of a take in their order and answers for instants among them. A frame that was lost is left
+// out: flow then spans the gap.
+class TrackingFlows {
+  public:
+    explicit TrackingFlows(TrackingFlowOptions options);
+
+    // One channel, all of one size, at least 16 * reduction pixels a side, NaN where nothing was seen. Ticks ascend.
+    // Error: another size than before, or too small.
+    Status add(double tick, const Image& image);
+
+    // Drops the tracking frames before the last one at or before `tick`.
+    void forget_before(double tick);
+
+    // From the instant to the tracking frames from the last at or before `from` to the first at or after `to`, as far as
+    // there are any. The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to
+    // move evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with
+    // itself. Flows between neighbours are kept for the next instant.
+    Result<MotionPath> path(double instant, double from, double to);
+
+  private:
+    struct Frame {
+        double tick;
+        Image image;
+        std::optional<FlowField> forward, backward;  // to the next frame, and from there
+    };
+
+    Status find_local_flows(size_t first, size_t last);
+    Status walk(const Image* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
+                MotionPath& path) const;
+
+    const TrackingFlowOptions options_;
+    int width_ = 0, height_ = 0;
+    std::deque<Frame> frames_;
+};
+
+// When pixels move evenly along `between`, from one instant to another: the flows to either from an instant in between,
+// `share` of the way. x' + share between(x') = x is solved by fixed-point iteration, which converges where the vectors of
+// neighbouring pixels differ by less than a pixel; elsewhere, at edges of occlusion, either side's vector comes out.
+struct SplitFlow {
+    FlowField to_first, to_second;
+};
+SplitFlow split(const FlowField& between, double share);
+
+}  // namespace ols
