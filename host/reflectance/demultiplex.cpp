@@ -67,11 +67,15 @@ std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
     return plans[basis.name] = made;
 }
 
-void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const int32_t* const> rows,
+template <typename Sample>
+void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const Sample* const> rows,
                          size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
-    const HadamardJob job{
-        .plan = &made.plan, .rows32 = {rows}, .floats = {lamps}, .factors = factors, .filler = options.filler};
+    HadamardJob job{.plan = &made.plan, .floats = {lamps}, .factors = factors, .filler = options.filler};
+    if constexpr (std::is_same_v<Sample, int16_t>)
+        job.rows16 = {rows};
+    else
+        job.rows32 = {rows};
     for_each_block(samples, options.threads, [&] {
         return [&, scratch = std::make_unique<TileScratch>(made.plan)](size_t begin, size_t count) {
             TileCounts counts;
@@ -124,33 +128,48 @@ struct Block {
     }
 };
 
-// Copies the rows of a block whose masked samples, if it has any, are filled; from: the rows at the block's begin.
-class FilledBlock {
+// The rows of a block as 32-bit counts, masked ones filled.
+template <typename Sample>
+class CountBlock {
   public:
-    FilledBlock(const Basis& basis, const SampleFiller* filler)
+    CountBlock(const Basis& basis, const SampleFiller* filler)
         : filler_(filler),
-          filled_(filler ? size_t(basis.rows) * block_samples : 0),
+          is_copied_(filler || !std::is_same_v<Sample, int32_t>),
+          counts_(is_copied_ ? size_t(basis.rows) * block_samples : 0),
           tile_(size_t(basis.rows) * tile_samples) {}
 
-    void fill(std::vector<const int32_t*>& from, size_t begin, size_t count) {
-        if (!filler_) return;
+    // from: the rows at the block's begin. What is returned lasts until the next call.
+    std::vector<const int32_t*> load(const std::vector<const Sample*>& from, size_t begin, size_t count) {
+        if constexpr (std::is_same_v<Sample, int32_t>)
+            if (!is_copied_) return from;
+        std::vector<const int32_t*> rows;
         for (size_t r = 0; r < from.size(); ++r) {
-            int32_t* const to = filled_.data() + r * block_samples;
-            if (from[r])
-                std::copy_n(from[r], count, to);
-            else
-                std::fill_n(to, count, masked_sample<int32_t>);
-            from[r] = to;
+            int32_t* const to = counts_.data() + r * block_samples;
+            copy(from[r], count, to);
+            rows.push_back(to);
         }
-        for (size_t at = 0; at < count; at += tile_samples)
+        for (size_t at = 0; filler_ && at < count; at += tile_samples)
             fill_tile(from.size(), begin, at, std::min(tile_samples, count - at));
+        return rows;
     }
 
   private:
+    void copy(const Sample* from, size_t count, int32_t* to) const {
+        const auto widened = [](Sample sample) {
+            return sample == masked_sample<Sample> ? masked_sample<int32_t> : int32_t(sample);
+        };
+        if (!from)
+            std::fill_n(to, count, masked_sample<int32_t>);
+        else if (filler_)
+            std::transform(from, from + count, to, widened);
+        else
+            std::copy_n(from, count, to);
+    }
+
     void fill_tile(size_t rows, size_t begin, size_t at, size_t count) {
         bool masked = false;
         for (size_t r = 0; r < rows; ++r) {
-            const int32_t* const row = filled_.data() + r * block_samples + at;
+            const int32_t* const row = counts_.data() + r * block_samples + at;
             std::fill(std::copy_n(row, count, tile_.data() + r * tile_samples), tile_.data() + (r + 1) * tile_samples,
                       0);
             masked = masked || std::find(row, row + count, masked_sample<int32_t>) != row + count;
@@ -158,11 +177,12 @@ class FilledBlock {
         if (!masked) return;
         filler_->fill(tile_.data(), begin + at, count);
         for (size_t r = 0; r < rows; ++r)
-            std::copy_n(tile_.data() + r * tile_samples, count, filled_.data() + r * block_samples + at);
+            std::copy_n(tile_.data() + r * tile_samples, count, counts_.data() + r * block_samples + at);
     }
 
     const SampleFiller* filler_;
-    std::vector<int32_t> filled_, tile_;
+    bool is_copied_;
+    std::vector<int32_t> counts_, tile_;
 };
 
 double largest_count(const std::vector<const int32_t*>& rows, size_t count) {
@@ -172,54 +192,101 @@ double largest_count(const std::vector<const int32_t*>& rows, size_t count) {
     return largest;
 }
 
+// Both precisions of a block, of which the counts choose one.
+class MatrixWorker {
+  public:
+    MatrixWorker(const Basis& basis, const InverseMatrix& matrix, std::span<float* const> lamps,
+                 std::span<const float> factors)
+        : basis_(basis),
+          matrix_(matrix),
+          lamps_(lamps),
+          factors_(factors),
+          one_row_each_(is_one_image_a_row(basis)),
+          small_(basis),
+          large_(basis) {}
+
+    template <typename Sample>
+    void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
+        bool fits_float = false;
+        if constexpr (std::is_same_v<Sample, int32_t>) fits_float = largest_count(rows, count) < matrix_.counts_limit;
+        if (one_row_each_) return scale(rows, begin, count);
+        if (fits_float)
+            small_.invert(basis_, matrix_.floats, rows, count), store(small_.images, begin, count);
+        else
+            large_.invert(basis_, matrix_.doubles, rows, count), store(large_.images, begin, count);
+    }
+
+  private:
+    template <typename Sample>
+    void scale(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
+        for (size_t i = 0; i < lamps_.size(); ++i)
+            for (size_t p = 0; p < count; ++p)
+                lamps_[i][begin + p] =
+                    float(matrix_.doubles[i * rows.size() + i] * double(rows[i][p])) * factors_[begin + p];
+    }
+
+    template <typename Real>
+    void store(const std::vector<Real>& images, size_t begin, size_t count) {
+        for (size_t i = 0; i < lamps_.size(); ++i)
+            for (size_t p = 0; p < count; ++p)
+                lamps_[i][begin + p] = float(images[i * block_samples + p]) * factors_[begin + p];
+    }
+
+    const Basis& basis_;
+    const InverseMatrix& matrix_;
+    std::span<float* const> lamps_;
+    std::span<const float> factors_;
+    bool one_row_each_;
+    Block<float> small_;
+    Block<double> large_;
+};
+
 template <typename Sample>
 void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
                            std::span<float* const> lamps, const DemultiplexOptions& options) {
     openblas_set_num_threads(1);  // blocks are what runs in parallel
     const InverseMatrix matrix(basis);
-    const bool one_row_each = is_one_image_a_row(basis);
     const auto factors = sample_factors(basis, samples, options);
-    const auto make_worker = [&] {
-        return [&, small = Block<float>(basis), large = Block<double>(basis),
-                filled = FilledBlock(basis, options.filler)](size_t begin, size_t count) mutable {
-            std::vector<const Sample*> from;
-            for (const Sample* row : rows) from.push_back(row ? row + begin : nullptr);
-            bool fits_float = false;
-            if constexpr (std::is_same_v<Sample, int32_t>) {
-                filled.fill(from, begin, count);
-                fits_float = largest_count(from, count) < matrix.counts_limit;
-            }
-            if (one_row_each) {
-                for (size_t i = 0; i < lamps.size(); ++i)
-                    for (size_t p = 0; p < count; ++p)
-                        lamps[i][begin + p] =
-                            float(matrix.doubles[i * rows.size() + i] * double(from[i][p])) * factors[begin + p];
-                return;
-            }
-            const auto store = [&](const auto& images) {
-                for (size_t i = 0; i < lamps.size(); ++i)
-                    for (size_t p = 0; p < count; ++p)
-                        lamps[i][begin + p] = float(images[i * block_samples + p]) * factors[begin + p];
-            };
-            if (fits_float)
-                small.invert(basis, matrix.floats, from, count), store(small.images);
-            else
-                large.invert(basis, matrix.doubles, from, count), store(large.images);
-        };
+    const auto at = [&](size_t begin) {
+        std::vector<const Sample*> from;
+        for (const Sample* row : rows) from.push_back(row ? row + begin : nullptr);
+        return from;
     };
-    for_each_block(samples, options.threads, make_worker);
+    for_each_block(samples, options.threads, [&] {
+        MatrixWorker worker(basis, matrix, lamps, factors);
+        if constexpr (std::is_same_v<Sample, float>)
+            return [&, worker = std::move(worker)](size_t begin, size_t count) mutable {
+                worker.invert(at(begin), begin, count);
+            };
+        else
+            return [&, worker = std::move(worker), counts = CountBlock<Sample>(basis, options.filler)](
+                       size_t begin, size_t count) mutable {
+                worker.invert(counts.load(at(begin), begin, count), begin, count);
+            };
+    });
 }
 
-}  // namespace
-
-void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
-                 std::span<float* const> lamps, const DemultiplexOptions& options) {
+template <typename Count>
+void demultiplex_counts(const Basis& basis, std::span<const Count* const> rows, size_t samples,
+                        std::span<float* const> lamps, const DemultiplexOptions& options) {
     assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
     assert(options.gain.empty() || options.gain.size() == samples);
     if (const auto made = plan_for(basis))
         demultiplex_by_plan(*made, basis, rows, samples, lamps, options);
     else
         demultiplex_by_matrix(basis, rows, samples, lamps, options);
+}
+
+}  // namespace
+
+void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                 std::span<float* const> lamps, const DemultiplexOptions& options) {
+    demultiplex_counts(basis, rows, samples, lamps, options);
+}
+
+void demultiplex(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
+                 std::span<float* const> lamps, const DemultiplexOptions& options) {
+    demultiplex_counts(basis, rows, samples, lamps, options);
 }
 
 void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,

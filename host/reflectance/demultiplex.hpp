@@ -18,7 +18,7 @@ struct DemultiplexOptions {
     // Multiplied into every lamp value of a sample: from counts to r it is 1 / (F t) (docs/architecture.md). Empty: 1.
     std::span<const float> gain;
     int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
-    // Asked for masked samples of int32_t rows (masked_sample.hpp). Without it no sample is masked and no row null.
+    // Asked for masked samples of rows of counts (masked_sample.hpp). Without it no sample is masked and no row null.
     const SampleFiller* filler = nullptr;
 };
 
@@ -26,6 +26,10 @@ struct DemultiplexOptions {
 // `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact when
 // |counts| < 2^23, which suits every camera of up to 16 bits. A basis without integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                 std::span<float* const> lamps, const DemultiplexOptions& options = {});
+
+// The same bits from 16-bit rows, as a camera or the warp makes them: by a plan in a quarter of the time, for nothing is narrowed.
+void demultiplex(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options = {});
 
 // The same for sources that do not quantise: sums in double. Here and without integer weights the order of a sum is the

@@ -258,11 +258,12 @@ HWY_INLINE void warp_line(const CountPlane& source, const LineRow& row, size_t r
 }
 
 template <int precision>
-void warp_rows(const CountPlane& source, const GroupMotion& motion, float fraction, int16_t* out, size_t out_pitch) {
+void warp_rows(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range, int16_t* out,
+               size_t out_pitch) {
     const int width = motion.width(), runs = motion.runs();
     LineRow row(runs);
-    for (int y = 0; y < motion.height(); ++y) {
-        int16_t* const to = out + size_t(y) * out_pitch;
+    for (int y = range.first; y < range.first + range.count; ++y) {
+        int16_t* const to = out + size_t(y - range.first) * out_pitch;
         find_lines(source, motion, fraction, y, row);
         for (int r = 0; r < runs; ++r) {
             if (row.fits[size_t(r)])
@@ -278,8 +279,8 @@ void warp_rows(const CountPlane& source, const GroupMotion& motion, float fracti
 #endif  // HWY_TARGET != HWY_SCALAR
 
 // Planes too narrow for the table, and processors without one.
-void warp_narrow(const CountPlane& source, const GroupMotion& motion, float fraction, int precision, int16_t* out,
-                 size_t out_pitch) {
+void warp_narrow(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                 int precision, int16_t* out, size_t out_pitch) {
     const FlowField &base = motion.base(), &step = motion.step();
     const auto part = [](float coordinate, int size, int16_t& whole, int16_t& weight) {
         const float held = std::min(std::max(coordinate, 0.0f), float(size - 1));
@@ -288,25 +289,26 @@ void warp_narrow(const CountPlane& source, const GroupMotion& motion, float frac
         return held != coordinate;
     };
     Sources s;
-    for (int y = 0; y < base.height; ++y)
+    for (int y = range.first; y < range.first + range.count; ++y)
         for (int x = 0; x < base.width; ++x) {
             const size_t at = size_t(y) * size_t(base.width) + size_t(x);
             const bool out_x = part(float(x) + (base.u[at] + fraction * step.u[at]), source.width, s.x[0], s.fx[0]);
             const bool out_y = part(float(y) + (base.v[at] + fraction * step.v[at]), source.height, s.y[0], s.fy[0]);
             s.outside[0] = out_x || out_y ? -1 : 0;
-            out[size_t(y) * out_pitch + size_t(x)] = pixel(source, s, 0, precision);
+            out[size_t(y - range.first) * out_pitch + size_t(x)] = pixel(source, s, 0, precision);
         }
 }
 
-void warp_plane(const CountPlane& source, const GroupMotion& motion, float fraction, int16_t* out, size_t out_pitch) {
+void warp_range(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                int16_t* out, size_t out_pitch) {
     constexpr int fine_largest = 4095, fine_bits = 2;
     const bool is_fine = source.largest <= fine_largest;
 #if HWY_TARGET != HWY_SCALAR
     if (source.width >= table_pixels)
-        return is_fine ? warp_rows<fine_bits>(source, motion, fraction, out, out_pitch)
-                       : warp_rows<0>(source, motion, fraction, out, out_pitch);
+        return is_fine ? warp_rows<fine_bits>(source, motion, fraction, range, out, out_pitch)
+                       : warp_rows<0>(source, motion, fraction, range, out, out_pitch);
 #endif
-    warp_narrow(source, motion, fraction, is_fine ? fine_bits : 0, out, out_pitch);
+    warp_narrow(source, motion, fraction, range, is_fine ? fine_bits : 0, out, out_pitch);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -316,7 +318,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ols {
 
-HWY_EXPORT(warp_plane);
+HWY_EXPORT(warp_range);
 
 FlowField seen_from_target(const FlowField& base, const FlowField& local) {
     FlowField seen = concatenated(base, local);
@@ -363,6 +365,14 @@ GroupMotion::GroupMotion(FlowField base, FlowField step, float tolerance_px)
     }
 }
 
+void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) const {
+    const size_t from = size_t(y) * size_t(width());
+    for (int x = 0; x < width(); ++x) {
+        x_out[x] = float(x) + (base_.u[from + size_t(x)] + fraction * step_.u[from + size_t(x)]);
+        y_out[x] = float(y) + (base_.v[from + size_t(x)] + fraction * step_.v[from + size_t(x)]);
+    }
+}
+
 double GroupMotion::linear_share() const {
     const size_t count = size_t(runs()) * size_t(height());
     size_t linear = 0;
@@ -370,10 +380,16 @@ double GroupMotion::linear_share() const {
     return count ? double(linear) / double(count) : 0;
 }
 
-void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, int16_t* out, size_t out_pitch) {
+void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                 int16_t* out, size_t out_pitch) {
     assert(source.counts && source.largest <= 16383);
     assert(motion.width() == source.width && motion.height() == source.height);
-    HWY_DYNAMIC_DISPATCH(warp_plane)(source, motion, fraction, out, out_pitch);
+    assert(range.first >= 0 && range.count >= 0 && range.first + range.count <= source.height);
+    HWY_DYNAMIC_DISPATCH(warp_range)(source, motion, fraction, range, out, out_pitch);
+}
+
+void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, int16_t* out, size_t out_pitch) {
+    warp_counts(source, motion, fraction, {0, source.height}, out, out_pitch);
 }
 
 }  // namespace ols

@@ -42,6 +42,9 @@ class GroupMotion {
     const Lines& lines() const { return lines_; }
     double linear_share() const;  // of the runs
 
+    // Where the pixels of row y are found at a fraction of the step, in the source's pixels; width() values each.
+    void positions(int y, float fraction, float* x_out, float* y_out) const;
+
   private:
     FlowField base_, step_;
     Lines lines_;
@@ -54,10 +57,29 @@ FlowField seen_from_target(const FlowField& base, const FlowField& local);
 // one colour of a mosaic needs.
 FlowField of_color_plane(const FlowField& flow, int first_x, int first_y);
 
-// The slot at a fraction of the group's step: 0 at the tracking frame nearer to the target. out[y * out_pitch + x] = the
-// bilinear mean of the four counts around the position, rounded. A position outside the plane, or one of whose counts with a
+struct RowRange {
+    int first = 0, count = 0;
+};
+
+// The rows of `range` of the slot at a fraction of the group's step: 0 at the tracking frame nearer to the target.
+// out[(y - range.first) * out_pitch + x] = the bilinear mean of the four counts around the position, rounded. A position outside the plane, or one of whose counts with a
 // weight above zero is masked, is masked. |counts| <= 16383; up to 4095 interpolation keeps two more bits. Integer arithmetic
-// but for the position: the same bits on every SIMD path. The position is within 2^-10 pixels of the line where it is on one.
+// but for the position: the same bits on every SIMD path and for any range. The position is within 2^-10 pixels of the line where it is on one.
+void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                 int16_t* out, size_t out_pitch);
+// All rows.
 void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, int16_t* out, size_t out_pitch);
+
+// One plane of samples of a source that does not quantise: NaN where there is none. Pitch in samples.
+struct SamplePlane {
+    const float* samples = nullptr;
+    int width = 0, height = 0;
+    size_t pitch = 0;
+};
+
+// The same for such samples, not rounded, by the same rules: a position outside the plane, or one of whose samples with a weight
+// above zero is not finite, becomes NaN; a whole position is its sample's bits.
+void warp_samples(const SamplePlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                  float* out, size_t out_pitch);
 
 }  // namespace ols

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "reflectance/demultiplex.hpp"
+#include "reflectance/planes.hpp"
 
 using namespace ols;
 
@@ -101,6 +102,54 @@ TEST_P(Demultiplex, float_rows_come_back_within_rounding) {
     demultiplex(basis, pointers(rows), 300, outputs(back));
     for (int i = 0; i < basis.lamps; ++i)
         for (size_t p = 0; p < 300; ++p) ASSERT_NEAR(back[i][p], lamps[i][p] * 0.125f, 1e-5);
+}
+
+// Fills with what tells row and sample apart.
+struct CountingFiller final : SampleFiller {
+    explicit CountingFiller(int row_count) : rows(row_count) {}
+    void fill(int32_t* tile, size_t begin, size_t count) const override {
+        for (int r = 0; r < rows; ++r)
+            for (size_t i = 0; i < count; ++i) {
+                int32_t& sample = tile[size_t(r) * tile_samples + i];
+                if (sample == masked_sample<int32_t>) sample = 100 + r + int32_t((begin + i) % 37);
+            }
+    }
+    int rows;
+};
+
+std::vector<std::vector<int16_t>> narrowed(const Counts& rows) {
+    std::vector<std::vector<int16_t>> out;
+    for (const auto& row : rows) {
+        out.emplace_back();
+        for (const int32_t v : row)
+            out.back().push_back(v == masked_sample<int32_t> ? masked_sample<int16_t> : int16_t(v));
+    }
+    return out;
+}
+
+TEST_P(Demultiplex, rows_of_16_bits_give_the_bits_of_32) {
+    for (const int largest : {4095, 32767}) {
+        const Counts rows = random_lamps(basis.rows, 2500, -largest, largest);
+        std::vector<float> gain(2500);
+        for (size_t p = 0; p < gain.size(); ++p) gain[p] = 0.01f * float(p % 13 + 1);
+        std::vector<std::vector<float>> lamps(basis.lamps, std::vector<float>(2500));
+        demultiplex(basis, pointers(narrowed(rows)), 2500, outputs(lamps), {gain, 2});
+        EXPECT_EQ(lamps, demultiplexed(basis, rows, {gain, 1}));
+    }
+}
+
+TEST_P(Demultiplex, masked_samples_and_lost_rows_of_16_bits_are_filled_like_those_of_32) {
+    Counts rows = random_lamps(basis.rows, 700, -100, 4095);
+    std::mt19937 random(2);
+    for (int i = 0; i < 300; ++i) rows[random() % rows.size()][random() % 600] = masked_sample<int32_t>;
+    rows.back().assign(700, masked_sample<int32_t>);
+    const auto narrow = narrowed(rows);
+    auto narrow_pointers = pointers(narrow);
+    narrow_pointers.back() = nullptr;
+    const CountingFiller filler(basis.rows);
+    std::vector<std::vector<float>> lamps(basis.lamps, std::vector<float>(700));
+    demultiplex(basis, narrow_pointers, 700, outputs(lamps), {{}, 1, &filler});
+    EXPECT_EQ(lamps, demultiplexed(basis, rows, {{}, 1, &filler}));
 }
 
 // A lamp that is black everywhere, under rows of 1000 counts and unit noise: what comes out is noise alone.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -178,6 +179,74 @@ TEST(WarpPaths, give_the_same_bits) {
     }
     hwy::SetSupportedTargetsForTest(0);
     for (const auto& result : results) EXPECT_EQ(result, results[0]);
+}
+
+TEST_P(Warp, rows_by_themselves_are_the_rows_of_the_whole_plane) {
+    Scene scene(97, 33);
+    scene.set_motion([](int x, int y) { return Vec3{std::sin(x * 0.3) * 6, std::cos(y * 0.2) * 4, 0}; }, true);
+    scene.tolerance_px = 0.02f;
+    const auto whole = scene.warped();
+    const GroupMotion motion(scene.base, scene.step, scene.tolerance_px);
+    const CountPlane source{scene.counts.data(), 97, 33, 97};
+    std::vector<int16_t> rows(whole.size());
+    for (int y = 0; y < 33; y += 7)
+        warp_counts(source, motion, scene.fraction, {y, std::min(7, 33 - y)}, &rows[size_t(y) * 97], 97);
+    EXPECT_EQ(rows, whole);
+}
+
+// Samples that no camera quantised.
+std::vector<float> warped_samples(const Scene& scene, const std::vector<float>& samples) {
+    std::vector<float> out(samples.size());
+    const SamplePlane source{samples.data(), scene.width, scene.height, size_t(scene.width)};
+    const GroupMotion motion(scene.base, scene.step, scene.tolerance_px);
+    const int half = scene.height / 2;
+    warp_samples(source, motion, scene.fraction, {0, half}, out.data(), size_t(scene.width));
+    warp_samples(source, motion, scene.fraction, {half, scene.height - half}, &out[size_t(half * scene.width)],
+                 size_t(scene.width));
+    return out;
+}
+
+TEST(SampleWarp, is_bilinear_interpolation_without_rounding) {
+    Scene scene(83, 41);
+    scene.set_motion([](int x, int y) { return Vec3{2.3 + 0.02 * y, -1.4 + 0.03 * x, 0}; });
+    for (size_t p = 0; p < scene.counts.size(); p += 31) scene.counts[p] = masked;
+    std::vector<float> samples;
+    for (const int16_t count : scene.counts) samples.push_back(count == masked ? NAN : float(count));
+    const auto out = warped_samples(scene, samples);
+    for (int y = 0; y < 41; ++y)
+        for (int x = 0; x < 83; ++x) {
+            const double wanted = scene.truth(x, y);
+            const float got = out[size_t(y * 83 + x)];
+            ASSERT_EQ(std::isnan(got), std::isnan(wanted)) << x << " " << y;
+            if (!std::isnan(wanted)) {
+                ASSERT_NEAR(got, wanted, 4095 * 4e-7) << x << " " << y;
+            }
+        }
+}
+
+TEST(SampleWarp, without_motion_returns_the_bits_of_its_input) {
+    Scene scene(40, 9);
+    scene.fraction = 0.7f;
+    std::vector<float> samples(360);
+    std::mt19937 random(8);
+    for (float& s : samples) s = std::ldexp(float(random()), -40) - 0.25f;
+    samples[3] = -0.0f, samples[7] = NAN, samples[8] = 1e-41f, samples[359] = -3e38f;
+    const auto out = warped_samples(scene, samples);
+    for (size_t p = 0; p < samples.size(); ++p) {
+        if (p == 7) continue;
+        ASSERT_EQ(std::bit_cast<uint32_t>(out[p]), std::bit_cast<uint32_t>(samples[p])) << p;
+    }
+    EXPECT_TRUE(std::isnan(out[7]));
+}
+
+TEST(SampleWarp, infinite_samples_and_flow_that_is_no_number_become_masked) {
+    Scene scene(32, 4);
+    std::vector<float> samples(128, 1);
+    samples[40] = INFINITY;
+    scene.base.u[3] = NAN;
+    scene.base.v[70] = -INFINITY;
+    const auto out = warped_samples(scene, samples);
+    for (size_t p = 0; p < out.size(); ++p) EXPECT_EQ(std::isnan(out[p]), p == 3 || p == 40 || p == 70) << p;
 }
 
 // Colours of a mosaic do not mix: planes of red only show red wherever they are moved from.
