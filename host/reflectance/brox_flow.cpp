@@ -19,6 +19,9 @@
 namespace ols {
 
 constexpr float psi_epsilon = 1e-6f;  // of Psi(s2) = sqrt(s2 + epsilon)
+// Of the smoothness at the first warp of a coarse level: with the sharp one an even flow is too stiff to move in few sweeps.
+constexpr float blunt_epsilon = 1e-2f;
+constexpr int least_coarsest_warps = 6;
 
 // A wish that w be (u, v), by colours: weight * Psi(|w - (u, v)|^2).
 struct FlowPull {
@@ -37,6 +40,7 @@ struct BroxTerm {
     FlowConstraint brightness, gradient_x, gradient_y;
     CheckeredPlane valid;
     float gradient = 0, smoothness = 0;
+    float smoothness_epsilon = psi_epsilon;
     std::vector<FlowPull> pulls;
 
     BroxTerm(int w, int h)
@@ -50,8 +54,8 @@ HWY_BEFORE_NAMESPACE();
 namespace ols {
 namespace HWY_NAMESPACE {
 
-HWY_INLINE float psi_derivative(float squared) {  // Psi', of the square
-    return 0.5f / std::sqrt(squared + psi_epsilon);
+HWY_INLINE float psi_derivative(float squared, float epsilon = psi_epsilon) {  // Psi', of the square
+    return 0.5f / std::sqrt(squared + epsilon);
 }
 
 struct BroxWeights {
@@ -72,11 +76,12 @@ struct BroxWeights {
             const float *v_up = v.row(above == y ? color : other, above),
                         *v_down = v.row(below == y ? color : other, below);
             float* const out = diffusivity.row(color, y & 1);
+            const float epsilon = term.smoothness_epsilon;
             OLS_INDEPENDENT
             for (int i = 0; i < n; ++i) {
                 const float ux = u_side[i] - u_side[i - 1], vx = v_side[i] - v_side[i - 1];
                 const float uy = u_down[i] - u_up[i], vy = v_down[i] - v_up[i];
-                out[i] = psi_derivative(0.25f * (ux * ux + vx * vx + uy * uy + vy * vy));
+                out[i] = psi_derivative(0.25f * (ux * ux + vx * vx + uy * uy + vy * vy), epsilon);
             }
         }
         // The first and last pixel of a row have no neighbour on one side: theirs is the next pixel's.
@@ -268,7 +273,7 @@ FlowPull pull_of_flow(const BroxFlowOptions& options, FlowViewer& viewer, const 
 }
 
 FlowField solve_level(const FlowPair& pair, const FlowField& begin, const BroxFlowOptions& options,
-                      const FlowField* initial, double scale, bool finest) {
+                      const FlowField* initial, double scale, bool finest, int warps) {
     constexpr float relaxation = 1.9f;
     const int width = begin.width, height = begin.height;
     Level level(pair, width, height);
@@ -278,8 +283,9 @@ FlowField solve_level(const FlowPair& pair, const FlowField& begin, const BroxFl
     if (initial && options.keep > 0)
         level.term.pulls.push_back(pull_of_flow(options, level.viewer, resized(*initial, width, height)));
     FlowField flow = begin;
-    for (int warp = 0; warp < (finest ? options.finest_warps : options.warps); ++warp) {
+    for (int warp = 0; warp < warps; ++warp) {
         linearize(level, flow);
+        level.term.smoothness_epsilon = warp == 0 && !finest ? blunt_epsilon : psi_epsilon;
         split(flow.u.data(), width, level.u);
         split(flow.v.data(), width, level.v);
         for (int n = 0; n < options.reweightings; ++n)
@@ -296,8 +302,11 @@ FlowField brox_flow(const FlowPair& pair, const BroxFlowOptions& options, const 
     const FlowPyramid pyramid = flow_pyramid(pair, options.ratio, options.coarsest, options.detail);
     return coarse_to_fine(pyramid, options.finest_level, initial, [&](size_t level, const FlowField& begin) {
         const double scale = double(begin.width) / pair.from.width;
-        return solve_level(pyramid.levels[level], begin, options, initial, scale,
-                           level == size_t(options.finest_level));
+        const bool finest = level == size_t(options.finest_level), coarsest = level + 1 == pyramid.levels.size();
+        const int warps = finest     ? options.finest_warps
+                          : coarsest ? std::max(options.warps, least_coarsest_warps)
+                                     : options.warps;
+        return solve_level(pyramid.levels[level], begin, options, initial, scale, finest, warps);
     });
 }
 

@@ -31,12 +31,20 @@ void quantize(const FlowPair& pair, cv::Mat& from, cv::Mat& to) {
     mat_of(pair.to).convertTo(to, CV_8U, scale, -darkest * scale);
 }
 
+// OpenCV reads beside images that are only few patches wide: those get a border on the right and below.
+void enlarge(cv::Mat& image, int smallest) {
+    const int right = std::max(smallest - image.cols, 0), below = std::max(smallest - image.rows, 0);
+    if (right + below > 0) cv::copyMakeBorder(image, image, 0, below, 0, right, cv::BORDER_REPLICATE);
+}
+
 }  // namespace
 
 FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
     cv::Mat from, to, vectors;
     quantize(pair, from, to);
     const int width = from.cols, height = from.rows;
+    const int smallest = 4 * options.patch_size << options.finest_scale;
+    for (cv::Mat* image : {&from, &to}) enlarge(*image, smallest);
     const cv::Ptr<cv::DISOpticalFlow> dis = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
     dis->setFinestScale(options.finest_scale);
     dis->setPatchSize(options.patch_size);
@@ -50,11 +58,15 @@ FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const Fl
         const std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, const_cast<float*>(initial->u.data())),
                                              cv::Mat(height, width, CV_32F, const_cast<float*>(initial->v.data()))};
         cv::merge(planes, vectors);
+        enlarge(vectors, smallest);
     }
     dis->calc(from, to, vectors);
     FlowField flow(width, height);
     std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, flow.u.data()),
                                    cv::Mat(height, width, CV_32F, flow.v.data())};
+    vectors = vectors(cv::Rect(0, 0, width, height));
+    from = from(cv::Rect(0, 0, width, height));
+    to = to(cv::Rect(0, 0, width, height));
     cv::split(vectors, planes);
     if (options.final_refinements > 0) {
         const cv::Ptr<cv::VariationalRefinement> refinement = cv::VariationalRefinement::create();

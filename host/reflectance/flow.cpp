@@ -51,7 +51,8 @@ struct Range {
     float low, high;
 };
 
-// Between the hundredths at either end, of means over 4 x 4 pixels, which noise and glints do not rule.
+// Between the hundredths at either end, of means over 4 x 4 pixels, which noise and glints do not rule; between the extremes
+// where a subject is smaller than that and all else even.
 Range brightness_range(const Image& image) {
     cv::Mat small;
     cv::resize(mat_of(image), small, {image.width / 4, image.height / 4}, 0, 0, cv::INTER_AREA);
@@ -60,16 +61,21 @@ Range brightness_range(const Image& image) {
     std::nth_element(values.begin(), values.begin() + ptrdiff_t(tail), values.end());
     const float low = values[tail];
     std::nth_element(values.begin(), values.begin() + ptrdiff_t(top), values.end());
-    return {low, values[top]};
+    if (values[top] > low) return {low, values[top]};
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    return {*least, *most};
 }
 
-// Brings both images to a range of about 0 to 1. Each by its own range: exposures may differ.
-void equalize_exposure(FlowPair& pair) {
+// Brings both images to a range of about 0 to 1. Each by its own range: exposures may differ. False where one is even: there is
+// nothing to find.
+bool equalize_exposure(FlowPair& pair) {
     for (Image* image : {&pair.from, &pair.to}) {
         const Range range = brightness_range(*image);
-        const float scale = range.high > range.low ? 1 / (range.high - range.low) : 0;
+        const float scale = 1 / (range.high - range.low);
+        if (!(range.high > range.low) || !std::isfinite(scale)) return false;
         for (float& v : image->data) v = (v - range.low) * scale;
     }
+    return true;
 }
 
 Status check(const Image& from, const Image& to, const FlowField* initial) {
@@ -189,7 +195,7 @@ Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOp
         all = Image(from.width, from.height, 1);
         std::fill(all.data.begin(), all.data.end(), 1.0f);
     }
-    equalize_exposure(pair);
+    if (!equalize_exposure(pair)) return initial ? *initial : FlowField(from.width, from.height);
     try {
         return std::visit([&](const auto& method) { return run(pair, method, initial); }, options.method);
     } catch (const cv::Exception& e) {

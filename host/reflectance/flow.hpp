@@ -30,7 +30,8 @@ Result<FlowOptions> flow_method(const std::string& name);
 
 // Where each pixel of `from` is found in `to`, in pixels: one-channel images of the same size, at least 16 pixels a side, in
 // any unit of brightness, exposed differently or not. `initial`, if given, is a flow of their size to begin with.
-// Always finite. Where no data says anything (textureless, dark, not seen) the flow is what its surroundings say, or zero.
+// Always finite. Where no data says anything (textureless, dark, not seen) the flow is what its surroundings say; where one of
+// the images shows nothing at all it is `initial`, or zero.
 // Deterministic: the same bits for any thread count. Errors: sizes and channels that do not fit, settings out of range.
 Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOptions& options = {},
                                 const FlowField* initial = nullptr);

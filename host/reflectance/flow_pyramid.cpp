@@ -35,8 +35,8 @@ Image smoothed(const Image& image, float sigma) {
     return out;
 }
 
-// In place, both on one scale: a subject that enters must not change that of what was there. Images without detail become zero.
-void take_detail(FlowPair& pair, const FlowDetail& detail) {
+// Takes the coarse part out, in place. The standard deviation of what is left of both images.
+double leave_detail(FlowPair& pair, const FlowDetail& detail) {
     const int side = 2 * detail.radius + 1;
     double variance = 0;
     for (Image* image : {&pair.from, &pair.to}) {
@@ -48,13 +48,26 @@ void take_detail(FlowPair& pair, const FlowDetail& detail) {
         cv::meanStdDev(fine, mean, deviation);
         variance += deviation[0] * deviation[0] / 2;
     }
-    const double scale = variance > 0 ? 1 / std::sqrt(variance) : 0;
+    return std::sqrt(variance);
+}
+
+void multiply(Image& image, double scale) {
     constexpr double step = 1 << 6;  // rounds to some 4e-6: what filters leave where nothing is becomes zero
-    for (Image* image : {&pair.from, &pair.to}) {
-        cv::Mat fine = mat_of(*image);
-        fine.convertTo(fine, -1, scale, step);
-        cv::subtract(fine, cv::Scalar(step), fine);
-    }
+    cv::Mat values = mat_of(image);
+    values.convertTo(values, -1, scale, step);
+    cv::subtract(values, cv::Scalar(step), values);
+}
+
+// Each level on a scale of its own, both images on one: a subject that enters must not change that of what was there. But a
+// level that has much less detail than the richest is not blown up to noise; images without detail become zero.
+void take_detail(std::vector<FlowPair>& levels, const FlowDetail& detail) {
+    constexpr double poorest = 0.3;  // of the richest level
+    std::vector<double> spreads;
+    for (FlowPair& level : levels) spreads.push_back(leave_detail(level, detail));
+    const double least = poorest * *std::max_element(spreads.begin(), spreads.end());
+    for (size_t i = 0; i < levels.size(); ++i)
+        for (Image* image : {&levels[i].from, &levels[i].to})
+            multiply(*image, least > 0 ? 1 / std::max(spreads[i], least) : 0);
 }
 
 FlowPair reduced(const FlowPair& pair, double ratio) {
@@ -78,7 +91,7 @@ FlowPyramid flow_pyramid(const FlowPair& pair, double ratio, int coarsest, const
         if (next < coarsest || next == side) break;
         pyramid.levels.push_back(reduced(last, ratio));
     }
-    for (FlowPair& level : pyramid.levels) take_detail(level, detail);
+    take_detail(pyramid.levels, detail);
     return pyramid;
 }
 

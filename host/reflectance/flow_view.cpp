@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "reflectance/flow_view.cpp"
@@ -86,15 +87,41 @@ void warp(const PaddedPlane& image, const FlowField& flow, PaddedPlane& out, Pad
     }
 }
 
+// The gain that gives the warped image, in `view.mean`, the energy of `from`, over what both show alike: pixels that differ by
+// more than a standard deviation do not count. Sums of a fixed number of lanes: the same bits on every path.
+float gain(const PaddedPlane& from, const FlowView& view) {
+    constexpr int lanes = 16;
+    float from_sums[lanes] = {}, moved_sums[lanes] = {};
+    double from_energy = 0, moved_energy = 0;
+    for (int y = 0; y < from.height; ++y) {
+        const float* HWY_RESTRICT a = from.row(y);
+        const float* HWY_RESTRICT b = view.mean.row(y);
+        const float* HWY_RESTRICT valid = view.valid.row(y);
+        for (int x = 0; x + lanes <= from.width; x += lanes)
+            for (int i = 0; i < lanes; ++i) {
+                const float d = a[x + i] - b[x + i], counts = d * d < 1 ? valid[x + i] : 0.0f;
+                from_sums[i] += counts * a[x + i] * a[x + i];
+                moved_sums[i] += counts * b[x + i] * b[x + i];
+            }
+        for (int i = 0; i < lanes; ++i) {
+            from_energy += double(from_sums[i]), moved_energy += double(moved_sums[i]);
+            from_sums[i] = moved_sums[i] = 0;
+        }
+    }
+    if (from_energy == 0 || moved_energy == 0) return 1;
+    return std::clamp(float(std::sqrt(from_energy / moved_energy)), 0.5f, 2.0f);
+}
+
 // `view.mean` holds the warped image.
 void compare(const PaddedPlane& from, FlowView& view) {
+    const float scale = gain(from, view);
     for (int y = 0; y < from.height; ++y) {
         const float* HWY_RESTRICT a = from.row(y);
         float* HWY_RESTRICT mean = view.mean.row(y);
         float* HWY_RESTRICT difference = view.difference.row(y);
         OLS_INDEPENDENT
         for (int x = 0; x < from.width; ++x) {
-            const float b = mean[x];
+            const float b = scale * mean[x];
             difference[x] = b - a[x];
             mean[x] = 0.5f * (a[x] + b);
         }

@@ -8,7 +8,8 @@
 namespace ols {
 
 // With `to` warped by the flow so far (cubic convolution, Keys 1981, a = -1/2): its mean with `from`, from which derivatives
-// are taken (both images' structure, halfway: less noise, no bias to either), and `to` minus `from`. Borders hold the edge.
+// are taken (both images' structure, halfway: less noise, no bias to either), and `to` minus `from`. The warped image is brought
+// to the energy of `from` first, measured where both look alike: what is left of unequal exposure. Borders hold the edge.
 struct FlowView {
     PaddedPlane mean, difference;
     PaddedPlane valid;  // how much of both images is seen, 0 to 1; 0 where the flow leads outside

@@ -14,7 +14,7 @@ namespace ols {
 // where the papers take a step of each by a bound of its second derivative; the image is warped and linearised anew more than
 // once a level; what is compared is the images' detail; the flow is median-filtered after each stage (Sun, Roth and Black 2010, "Secrets of optical flow").
 struct RobustFlowOptions {
-    FlowDetail detail;
+    FlowDetail detail = {};
     float smoothness = 1.0f;
     float data_sigma = 0.04f;  // of the detail's standard deviation
     float flow_sigma = 0.05f;  // pixels a pixel
