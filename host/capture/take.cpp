@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Gathering cycles, developing and writing them behind the recorder.
+// Gathering frames, developing and writing them behind the recorder.
 #include "capture/take.hpp"
 
 #include <fmt/format.h>
@@ -8,8 +8,10 @@
 #include <chrono>
 #include <numeric>
 #include <thread>
+#include <variant>
 
 #include "capture/event_queue.hpp"
+#include "capture/frame_store.hpp"
 #include "capture/missing_ranges.hpp"
 
 namespace ols {
@@ -22,16 +24,24 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// What one target is made of, and from which of the take's frames on it needs them.
+struct Job {
+    uint32_t index = 0;
+    std::variant<CycleFrames, TargetFrames> frames;
+};
+
 // A target, or why there is none.
 struct Outcome {
-    uint32_t cycle = 0;
+    uint32_t index = 0;
     std::unique_ptr<Target> target;
     std::string why;
     nlohmann::json detail;
 };
 
+const char* const witnesses[] = {"board log", "camera id and time", "optical code"};
+
 nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence) {
-    nlohmann::json json = {{"cycle", frames.cycle}, {"witnesses", {"board log", "camera id and time", "optical code"}}};
+    nlohmann::json json = {{"cycle", frames.cycle}, {"witnesses", witnesses}};
     int used = 0;
     for (const auto& frame : frames.slots) {
         if (!frame) continue;
@@ -49,6 +59,29 @@ nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence
     return json;
 }
 
+nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequence) {
+    const uint64_t length = sequence.slots.size();
+    nlohmann::json json = {{"cycle", frames.basis.target / length},
+                           {"slot", frames.basis.target % length},
+                           {"witnesses", witnesses},
+                           {"basis_slots", sequence.basis.rows},
+                           {"frames", frames.frames.size() + frames.tracking.size()},
+                           {"missing_slots", frames.basis.lost}};
+    for (const auto& one : frames.tracking)
+        if (one.number == frames.basis.target) json["tick"] = one.frame->tick;
+    const auto by_tick = [](const auto& frame) { return frame->tick; };
+    if (!frames.frames.empty()) {
+        json["first_tick"] = std::ranges::min(frames.frames, {}, by_tick)->tick;
+        json["last_tick"] = std::ranges::max(frames.frames, {}, by_tick)->tick;
+        json["exposure_ticks"] = frames.frames.front()->exposure_ticks;
+    }
+    for (const auto& choice : frames.basis.choices)
+        if (choice.is_stand_in) json["slots_from_neighbours"].push_back(choice.slot);
+    for (const uint64_t number : frames.lost_tracking)
+        json["tracking_missing"].push_back({{"cycle", number / length}, {"slot", number % length}});
+    return json;
+}
+
 // Noise variance of a recovered image over that of one row image, mean over lamps, for noise that does not depend on light.
 double noise_gain(const Basis& basis) {
     double sum = 0;
@@ -56,14 +89,42 @@ double noise_gain(const Basis& basis) {
     return sum / basis.images();
 }
 
+// The targets that a take is to have, in order, each with the frames that it waits for and those it may still use.
+struct Plan {
+    struct Entry {
+        uint64_t target = 0;  // number of a performance's tracking frame, or a cycle
+        FrameRange frames;
+    };
+    std::vector<Entry> entries;
+
+    Plan(const Sequence& sequence, const TakeMasks& masks, const TakeTargets& targets) {
+        const uint64_t length = sequence.slots.size(), last = sequence.trigger_count() - 1;
+        if (targets.every > 0) {
+            for (const uint64_t target : target_numbers(sequence, targets.every))
+                entries.push_back({target, frames_around(sequence, target)});
+            return;
+        }
+        const uint64_t beside = masks.fill_from_neighbours ? length : 0;
+        for (uint64_t cycle = 0; cycle < uint64_t(sequence.config.cycles); ++cycle) {
+            const uint64_t first = cycle * length;
+            entries.push_back({cycle, {std::max(first, beside) - beside, std::min(first + length - 1 + beside, last)}});
+        }
+    }
+};
+
 class TakeWriter {
   public:
     TakeWriter(const Sequence& sequence, const StageConfig& stage, const Calibration& calibration,
-               const TakeMasks& masks, ArchiveWriter& archive)
+               const TakeMasks& masks, const TakeTargets& targets, ArchiveWriter& archive)
         : sequence_(sequence),
           masks_(masks),
+          is_performance_(targets.every > 0),
           archive_(archive),
           developer_(sequence, calibration.cameras[0], stage.cameras[0].noise, {masks.estimate, stage.lamps}),
+          motion_developer_(sequence, calibration.cameras[0], stage.cameras[0].noise, {masks.estimate, stage.lamps},
+                            targets.quality),
+          plan_(sequence, masks, targets),
+          store_(sequence),
           missing_(sequence),
           develop_thread_([this] { develop(); }),
           write_thread_([this] { write(); }) {}
@@ -73,16 +134,27 @@ class TakeWriter {
     }
 
     void add_frame(std::shared_ptr<const Frame> frame) {
-        if (sequence_.slots[frame->slot].kind != SlotKind::basis) return;
-        gather(frame->cycle).slots[frame->slot] = std::move(frame);
+        const SlotKind kind = sequence_.slots[frame->slot].kind;
+        if (next_ == plan_.entries.size() || number_of(*frame, sequence_) < plan_.entries[next_].frames.first) return;
+        if (kind == SlotKind::basis || (is_performance_ && kind == SlotKind::tracking)) store_.add(std::move(frame));
     }
     void add_missing(const MissingSlot& slot) { missing_.add(slot); }
 
-    // Hands on the cycles whose triggers are all decided, and with neighbours those of the cycle after too.
+    // Hands on the targets whose frames are all decided.
     void hand_on(uint64_t decided) {
-        for (; next_cycle_ < cycles() && (next_cycle_ + 1 + ahead_of(next_cycle_)) * sequence_.slots.size() <= decided;
-             ++next_cycle_)
-            hand_on_next();
+        for (; next_ < plan_.entries.size() && plan_.entries[next_].frames.last < decided; ++next_) {
+            const Plan::Entry& entry = plan_.entries[next_];
+            const auto index = uint32_t(next_);
+            Job job{index, {}};
+            if (is_performance_)
+                job.frames = store_.around(index, entry.target);
+            else
+                job.frames = store_.cycle(uint32_t(entry.target), masks_.fill_from_neighbours);
+            // What no later target needs is let go of before the camera may have to wait.
+            const bool is_last = next_ + 1 == plan_.entries.size();
+            store_.forget_before(is_last ? sequence_.trigger_count() : plan_.entries[next_ + 1].frames.first);
+            to_develop_.push(std::move(job));
+        }
     }
 
     // Waits until everything handed on is written, and completes the report.
@@ -91,60 +163,44 @@ class TakeWriter {
         develop_thread_.join();
         to_write_.close();
         write_thread_.join();
+        report_.seconds_motion = motion_developer_.times();
     }
 
     TakeReport report() const { return report_; }
     nlohmann::json missing_json() const { return missing_.to_json(); }
 
   private:
-    uint64_t cycles() const { return uint64_t(sequence_.config.cycles); }
-    uint64_t ahead_of(uint64_t cycle) const { return masks_.fill_from_neighbours && cycle + 1 < cycles() ? 1 : 0; }
-
-    void hand_on_next() {
-        const auto cycle = uint32_t(next_cycle_);
-        if (!masks_.fill_from_neighbours) {
-            to_develop_.push(std::move(gather(cycle)));
-            gathered_.erase(cycle);
-            return;
-        }
-        CycleFrames frames = gather(cycle);
-        frames.neighbours.resize(frames.slots.size());
-        for (const int slot : missing_basis_slots(frames, sequence_))
-            for (const uint64_t other : {next_cycle_ - 1, next_cycle_ + 1})
-                if (const auto kept = gathered_.find(uint32_t(other)); kept != gathered_.end())
-                    if (const auto& frame = kept->second.slots[size_t(slot)])
-                        frames.neighbours[size_t(slot)].push_back(frame);
-        if (cycle > 0) gathered_.erase(cycle - 1);
-        to_develop_.push(std::move(frames));
-    }
-
-    CycleFrames& gather(uint32_t cycle) {
-        CycleFrames& frames = gathered_[cycle];
-        frames.cycle = cycle;
-        frames.slots.resize(sequence_.slots.size());
-        return frames;
-    }
+    Result<Target> develop(const CycleFrames& frames) { return developer_.develop(frames); }
+    Result<Target> develop(const TargetFrames& frames) { return motion_developer_.develop(frames); }
 
     void develop() {
-        while (auto frames = to_develop_.pop()) {
+        while (auto job = to_develop_.pop()) {
             const auto start = Clock::now();
-            Outcome outcome{frames->cycle, nullptr, "", provenance_of(*frames, sequence_)};
-            auto target = developer_.develop(*frames);
+            Outcome outcome{job->index, nullptr, "", {}};
+            outcome.detail =
+                std::visit([&](const auto& frames) { return provenance_of(frames, sequence_); }, job->frames);
+            auto target = std::visit([&](const auto& frames) { return develop(frames); }, job->frames);
             if (target.ok()) {
                 outcome.target = std::make_unique<Target>(std::move(*target));
-                outcome.target->index = frames->cycle;
-                if (outcome.target->provenance.is_object()) outcome.detail.update(outcome.target->provenance);
-                outcome.detail["saturated_pixels"] = count(mask_saturated, *outcome.target, report_.saturated_share);
-                outcome.detail["estimated_pixels"] = count(mask_estimated, *outcome.target, report_.estimated_share);
-                outcome.detail["unsolved_pixels"] = count(mask_unsolved, *outcome.target, report_.unsolved_share);
-                outcome.target->provenance = outcome.detail;
+                describe(*outcome.target, job->index, outcome.detail);
             } else {
                 outcome.why = target.error().message;
             }
-            frames.reset();  // its memory takes the camera's next frames
+            job.reset();  // its memory takes the camera's next frames
             report_.seconds_develop += seconds_since(start);
             to_write_.push(std::move(outcome));
         }
+    }
+
+    void describe(Target& target, uint32_t index, nlohmann::json& detail) {
+        target.index = index;
+        if (target.provenance.is_object()) detail.update(target.provenance);
+        detail["saturated_pixels"] = count(mask_saturated, target, report_.saturated_share);
+        detail["estimated_pixels"] = count(mask_estimated, target, report_.estimated_share);
+        detail["unsolved_pixels"] = count(mask_unsolved, target, report_.unsolved_share);
+        if (!target.confidence.empty())
+            detail["misaligned_pixels"] = count(mask_misaligned, target, report_.misaligned_share);
+        target.provenance = detail;
     }
 
     // The pixels with a mask bit; raises `worst` to their share.
@@ -160,23 +216,26 @@ class TakeWriter {
             const auto start = Clock::now();
             Status status = outcome->target
                                 ? archive_.write_target(*outcome->target)
-                                : archive_.note_missing_target(0, outcome->cycle, outcome->why, outcome->detail);
+                                : archive_.note_missing_target(0, outcome->index, outcome->why, outcome->detail);
             ++(outcome->target && status.ok() ? report_.targets_written : report_.targets_missing);
             if (!status.ok() && report_.write_error.empty())
-                report_.write_error = fmt::format("target {}: {}", outcome->cycle, status.error().message);
+                report_.write_error = fmt::format("target {}: {}", outcome->index, status.error().message);
             report_.seconds_write += seconds_since(start);
         }
     }
 
     const Sequence& sequence_;
     const TakeMasks masks_;
+    const bool is_performance_;
     ArchiveWriter& archive_;
     Developer developer_;
+    MotionDeveloper motion_developer_;
+    const Plan plan_;
+    FrameStore store_;
     MissingRanges missing_;
-    std::map<uint32_t, CycleFrames> gathered_;
-    uint64_t next_cycle_ = 0;
+    size_t next_ = 0;    // of the plan
     TakeReport report_;  // each field is written by one thread, and read when all have ended
-    EventQueue<CycleFrames> to_develop_{1};
+    EventQueue<Job> to_develop_{1};
     EventQueue<Outcome> to_write_{1};
     std::thread develop_thread_, write_thread_;
 };
@@ -197,6 +256,14 @@ nlohmann::json describe_sequence(const Sequence& sequence) {
             {"noise_gain", noise_gain(sequence.basis)}};
 }
 
+nlohmann::json describe_motion(const Sequence& sequence, const TakeTargets& targets) {
+    const double half_cycle_s = 0.5 * double(sequence.cycle_ticks()) / double(tick_hz);
+    return {{"quality", targets.quality.name},
+            {"tracking_frames_a_target", targets.every},
+            {"tracking_rate_hz", tracking_rate_hz(sequence)},
+            {"reach_ms", 1e3 * half_cycle_s}};  // of the basis, before and after a target
+}
+
 }  // namespace
 
 std::optional<double> measured_black(const Calibration& calibration) {
@@ -206,11 +273,12 @@ std::optional<double> measured_black(const Calibration& calibration) {
 }
 
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                            const Calibration& calibration, const TakeMasks& masks, ArchiveWriter& archive,
-                            const std::atomic<bool>& stop, const std::function<void(const Frame&)>& identified,
+                            const Calibration& calibration, const TakeMasks& masks, const TakeTargets& targets,
+                            ArchiveWriter& archive, const std::atomic<bool>& stop,
+                            const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress) {
     const auto start = Clock::now();
-    TakeWriter writer(sequence, stage, calibration, masks, archive);
+    TakeWriter writer(sequence, stage, calibration, masks, targets, archive);
     const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
                               identified(*frame);
                               writer.add_frame(std::move(frame));
@@ -220,12 +288,15 @@ Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequen
                               writer.hand_on(decided);
                               progress(decided, total);
                           },
-                          masks.fill_from_neighbours ? size_t(2) : size_t(0)};
+                          targets.every > 0            ? size_t(3)
+                          : masks.fill_from_neighbours ? size_t(2)
+                                                       : size_t(0)};
     auto record = record_take(board, camera, sequence, stage, measured_black(calibration), sink, stop);
     writer.finish();
     if (!record.ok()) return record.error();
     TakeReport report = writer.report();
     report.record = *record;
+    if (targets.every > 0) archive.add_to_manifest({{"motion", describe_motion(sequence, targets)}});
     archive.add_to_manifest({{"sequence", describe_sequence(sequence)},
                              {"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}},
                              {"calibration", calibration.source},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Take: records a sequence and writes its archive, one target a cycle, while it plays.
+// Take: records a sequence and writes its archive, target by target, while it plays.
 #pragma once
 
 #include <atomic>
@@ -8,6 +8,7 @@
 
 #include "archive/archive.hpp"
 #include "capture/develop.hpp"
+#include "capture/motion_developer.hpp"
 #include "capture/recorder.hpp"
 #include "stage/calibration.hpp"
 
@@ -20,6 +21,9 @@ struct TakeReport {
     double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
     // Where the time went: of the whole take, and busy in each thread.
     double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
+    MotionDeveloper::Times seconds_motion;  // parts of seconds_develop, of a performance
+    // Share of a target's pixels where motion compensation failed, in the worst target.
+    double misaligned_share = 0;
     std::string write_error;  // the first target that could not be written, and why; empty when all were
 };
 
@@ -31,13 +35,22 @@ struct TakeMasks {
     Estimate estimate = Estimate::none;
 };
 
+// Which targets a take has: one a cycle, of the cycle's frames, for subjects that hold still; or a performance.
+struct TakeTargets {
+    // A target at every so manieth tracking frame, of the frames nearest to it (lazy_basis.hpp). 0: one a cycle.
+    int every = 0;
+    MotionQuality quality = {};  // of a performance
+};
+
 // Threads: the camera's, the board's, the caller's, which identifies, one that develops, one that writes. Each hands on
-// one thing at a time; memory is bounded by frames_in_flight() frames and two targets.
+// one thing at a time, and developing runs on all processors; memory is bounded by frames_in_flight() frames and two
+// targets. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
 // `identified` sees every frame that has its slot, in the caller's thread. `info` gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
 // Errors: the board cannot be started. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                            const Calibration& calibration, const TakeMasks& masks, ArchiveWriter& archive,
-                            const std::atomic<bool>& stop, const std::function<void(const Frame&)>& identified,
+                            const Calibration& calibration, const TakeMasks& masks, const TakeTargets& targets,
+                            ArchiveWriter& archive, const std::atomic<bool>& stop,
+                            const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress);
 
 // The mean black level of a calibration, for the optical code; nothing for a nominal one.

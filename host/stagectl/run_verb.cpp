@@ -20,7 +20,8 @@ struct Options {
     std::string output, calibration, frames;
     TakeInfo slate;
     int cycles = 0;
-    std::string fill = "none", estimate = "none";
+    std::string fill = "none", estimate = "none", quality;
+    double fps = 0;
     bool nominal = false, overwrite = false, single_float = false, json = false;
 };
 
@@ -34,9 +35,11 @@ Result<Calibration> open_calibration(const Options& options, const StageConfig& 
     return read_calibration(folder, stage);
 }
 
-TakeInfo describe_take(const Options& options, const Sequence& sequence, const StageConfig& stage) {
+TakeInfo describe_take(const Options& options, const Sequence& sequence, const StageConfig& stage,
+                       const TakeTargets& targets) {
     TakeInfo info = options.slate;
-    info.frame_rate_hz = double(tick_hz) / double(sequence.cycle_ticks());
+    info.frame_rate_hz = targets.every > 0 ? tracking_rate_hz(sequence) / targets.every
+                                           : double(tick_hz) / double(sequence.cycle_ticks());
     info.basis = sequence.basis.name;
     info.value_unit = "reflectance";
     info.lights = image_lights(sequence.basis, stage.lamps);
@@ -63,8 +66,14 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"saturated_share", report.saturated_share},
             {"estimated_share", report.estimated_share},
             {"unsolved_share", report.unsolved_share},
+            {"misaligned_share", report.misaligned_share},
             {"seconds",
-             {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
+             {{"total", report.seconds_total},
+              {"develop", report.seconds_develop},
+              {"flow", report.seconds_motion.flow},
+              {"planes", report.seconds_motion.planes},
+              {"invert", report.seconds_motion.invert},
+              {"write", report.seconds_write}}}};
 }
 
 void print_report(const TakeReport& report, bool is_estimate, const Options& options) {
@@ -87,6 +96,10 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
                    "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: --estimate "
                    "smooth or nonnegative estimates them\n",
                    report.unsolved_share * 100);
+    if (report.misaligned_share > 0)
+        fmt::print(stderr,
+                   "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",
+                   report.misaligned_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (is_estimate)
         fmt::print(stderr,
@@ -120,6 +133,42 @@ TakeMasks masks_of(const Options& options) {
     return masks;
 }
 
+// A performance where --fps is given, one target a cycle else.
+Result<TakeTargets> targets_of(const Options& options, const Sequence& sequence) {
+    TakeTargets targets;
+    if (options.fps == 0) {
+        if (!options.quality.empty())
+            return fail("--quality is of a performance: give its targets a second, too, as --fps 24");
+        return targets;
+    }
+    if (options.fill == "neighbours")
+        return fail(
+            "--fill neighbours is for subjects that hold still; with --fps, lost slots come from the next cycle "
+            "anyway");
+    const auto every = tracking_frames_a_target(sequence, options.fps);
+    if (!every.ok()) return every.error();
+    auto quality = motion_quality(options.quality.empty() ? "standard" : options.quality);
+    if (!quality.ok()) return quality.error();
+    if (target_numbers(sequence, *every).empty())
+        return fail(fmt::format(
+            "{} {} of the basis hold no target: half a cycle is needed before and after one; give --cycles {}",
+            sequence.config.cycles, sequence.config.cycles == 1 ? "cycle" : "cycles", sequence.config.cycles + 1));
+    targets.every = *every;
+    targets.quality = std::move(*quality);
+    return targets;
+}
+
+// Wenger's flow holds for 1/24 s; longer cycles take frames from farther away.
+void warn_of_long_cycles(const Sequence& sequence, const TakeTargets& targets) {
+    const double reach_s = 0.5 * double(sequence.cycle_ticks()) / double(tick_hz);
+    if (targets.every > 0 && reach_s > 1.01 / 24)
+        fmt::print(stderr,
+                   "stagectl: a cycle lasts {:.1f} ms: frames up to {:.1f} ms from a target are aligned, more than "
+                   "1/24 s; fast "
+                   "motion may fail\n",
+                   2e3 * reach_s, 1e3 * reach_s);
+}
+
 Result<int> run(const Options& options) {
     auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
@@ -135,15 +184,19 @@ Result<int> run(const Options& options) {
             "harmonics and start = \"photo\" with `stagectl play`");
     const auto calibration = open_calibration(options, *stage);
     if (!calibration.ok()) return calibration.error();
+    const auto targets = targets_of(options, *sequence);
+    if (!targets.ok()) return targets.error();
+    warn_of_long_cycles(*sequence, *targets);
     auto account = open_account(options.frames);
     if (!account.ok()) return account.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
-    auto archive = ArchiveWriter::create(options.output, describe_take(options, *sequence, *stage), options.overwrite);
+    auto archive =
+        ArchiveWriter::create(options.output, describe_take(options, *sequence, *stage, *targets), options.overwrite);
     if (!archive.ok()) return archive.error();
 
     const auto report = run_take(
-        *session->board, *session->camera, *sequence, *stage, *calibration, masks_of(options), *archive,
+        *session->board, *session->camera, *sequence, *stage, *calibration, masks_of(options), *targets, *archive,
         stop_on_signal(), [&](const Frame& frame) { add_to_account(*account, frame); },
         [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
     if (!report.ok()) return report.error();
@@ -161,6 +214,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Example: stagectl run --sequence examples/sequence_s159.toml --stage examples/stage.toml \\\n"
         "           --board socket:run/board.sock --camera ring:run/cam0.ring --calibration cal -o take.rfa\n"
+        "         stagectl run --sequence actor.toml --fps 24 --quality final ... -o performance.rfa\n"
         "         stagectl run --basis triangle --board usb: --camera ring:run/cam0.ring --calibration cal -o "
         "take.rfa\n"
         "Ctrl-C turns the light off and finishes the archive with what was recorded; a second one ends at once.\n"
@@ -173,6 +227,18 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--calibration", options->calibration, "folder of `stagectl calibrate`");
     verb->add_flag("--nominal", options->nominal, "no calibration: black level and gain as the stage states them");
     verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();
+    verb->add_option(
+            "--fps", options->fps,
+            "a performance: targets a second, at tracking frames (of the paper's 120 a second: 24, 30, 60, 120 ...), "
+            "each "
+            "of the frames nearest to it, brought to its time. Otherwise one target a cycle, for subjects that "
+            "hold still")
+        ->check(CLI::PositiveNumber);
+    verb->add_option(
+            "--quality", options->quality,
+            "motion compensation of a performance: none, preview, standard (if not said otherwise) or final; what "
+            "each costs and errs: docs/accuracy.md")
+        ->check(CLI::IsMember(motion_quality_names()));
     verb->add_option("--frames", options->frames, "file for a JSON line a frame: its id and time, its cycle and slot");
     verb->add_option("--fill", options->fill,
                      "lost slots of the basis: none, or neighbours: the same slot of the cycles before and after; a "

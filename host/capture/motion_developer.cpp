@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// Flow, planes, rows, inversion, one after the other; each runs on several threads by itself.
+#include "capture/motion_developer.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+
+#include "parallel.hpp"
+
+namespace ols {
+
+namespace {
+
+// Adds the time of its life to a sum.
+class Stopwatch {
+  public:
+    explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+    ~Stopwatch() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  private:
+    double& seconds_;
+    const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// The middle of an exposure: what motion in a frame is a mean about.
+double middle_tick(const Frame& frame) {
+    return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
+}
+
+// The target's instant: its tracking frame's, or where that was lost, what the nearest tracking frame says of it.
+double instant_of(const TargetFrames& frames, const Sequence& sequence) {
+    const auto away = [&](const TargetFrames::Tracking& one) {
+        return std::abs(double(one.number) - double(frames.basis.target));
+    };
+    const auto nearest = std::ranges::min_element(frames.tracking, {}, away);
+    return middle_tick(*nearest->frame) +
+           (double(frames.basis.target) - double(nearest->number)) * double(sequence.slots.front().period_ticks);
+}
+
+}  // namespace
+
+MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration,
+                                 const NoiseModel& noise, DevelopOptions options, MotionQuality quality)
+    : sequence_(sequence),
+      calibration_(calibration),
+      options_(options),
+      quality_(std::move(quality)),
+      developer_(sequence, calibration, noise, std::move(options)),
+      flows_([&] {
+          TrackingFlowOptions flow = quality_.flow;
+          flow.threads = options_.threads;
+          return flow;
+      }()) {}
+
+MotionDeveloper::~MotionDeveloper() = default;
+
+Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
+    const Stopwatch watch(times_.flow);
+    std::vector<const TargetFrames::Tracking*> fresh;
+    for (const auto& one : frames.tracking)
+        if (!last_tracking_ || one.number > *last_tracking_) fresh.push_back(&one);
+    std::vector<Image> images(fresh.size());
+    for_each_index(options_.threads, fresh.size(), [&](size_t i) {
+        images[i] = tracking_image(*fresh[i]->frame, calibration_.black, calibration_.flat);
+    });
+    for (size_t i = 0; i < fresh.size(); ++i) {
+        if (Status added = flows_.add(middle_tick(*fresh[i]->frame), images[i]); !added.ok()) return added.error();
+        last_tracking_ = fresh[i]->number;
+    }
+    double from = middle_tick(*frames.frames.front()), to = from;
+    for (const auto& frame : frames.frames) {
+        from = std::min(from, middle_tick(*frame));
+        to = std::max(to, middle_tick(*frame));
+    }
+    if (frames.tracking.empty()) {
+        MotionKnot alone{from, FlowField(int(frames.frames[0]->width), int(frames.frames[0]->height)), {}};
+        alone.confidence.assign(alone.flow.size(), 0.0f);
+        return MotionPath{std::move(alone)};
+    }
+    flows_.forget_before(from);
+    return flows_.path(instant_of(frames, sequence_), from, to);
+}
+
+template <typename Sample, typename Sum>
+AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
+                                                PlanesByNumber<Sample>& known) {
+    const Stopwatch watch(times_.planes);
+    AlignedRows<Sample, Sum> aligned;
+    aligned.rows.resize(size_t(sequence_.basis.rows));
+    aligned.masks_untrusted = options_.estimate != Estimate::none;
+    aligned.threads = options_.threads;
+    std::vector<std::shared_ptr<const ColorPlanes<Sample>>> planes(frames.frames.size());
+    for_each_index(options_.threads, planes.size(), [&](size_t i) {
+        const auto found = known.find(frames.basis.choices[i].number);
+        planes[i] =
+            found != known.end()
+                ? found->second
+                : std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*frames.frames[i], calibration_.black));
+    });
+    known.clear();
+    for (size_t i = 0; i < planes.size(); ++i) {
+        const LazyBasis::Choice& choice = frames.basis.choices[i];
+        known[choice.number] = planes[i];
+        aligned.rows[size_t(sequence_.slots[size_t(choice.slot)].row)].push_back(
+            {planes[i], alignment->place_of(middle_tick(*frames.frames[i]))});
+    }
+    aligned.alignment = std::move(alignment);
+    return aligned;
+}
+
+Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames) {
+    auto path = find_path(frames);
+    if (!path.ok()) return path.error();
+    const Frame& like = *frames.frames.front();
+    std::shared_ptr<const Alignment> alignment;
+    {
+        const Stopwatch watch(times_.flow);
+        alignment = std::make_shared<Alignment>(*path, int(like.width), int(like.height), like.cfa,
+                                                quality_.line_tolerance_px, options_.threads);
+    }
+    AlignedFrames aligned;
+    aligned.like = frames.frames.front();
+    if (fits_shorts(like, calibration_.black))
+        aligned.rows = align<int16_t, int16_t>(frames, alignment, short_planes_);
+    else if (like.format == PixelFormat::u16)
+        aligned.rows = align<float, int32_t>(frames, alignment, float_planes_);
+    else
+        aligned.rows = align<float, float>(frames, alignment, float_planes_);
+    return aligned;
+}
+
+Result<Target> MotionDeveloper::develop(const TargetFrames& frames) {
+    if (frames.frames.empty()) return fail("every basis slot around the target is missing");
+    if (!quality_.compensates) {
+        RowFrames rows(size_t(sequence_.basis.rows));
+        for (size_t i = 0; i < frames.frames.size(); ++i)
+            rows[size_t(sequence_.slots[size_t(frames.basis.choices[i].slot)].row)].push_back(frames.frames[i]);
+        const Stopwatch watch(times_.invert);
+        return developer_.develop(rows, frames.basis.lost);
+    }
+    auto aligned = align(frames);
+    if (!aligned.ok()) return aligned.error();
+    const Stopwatch watch(times_.invert);
+    return developer_.develop(*aligned, frames.basis.lost);
+}
+
+}  // namespace ols

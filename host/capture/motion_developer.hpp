@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// Motion developer: targets of a performance, each from the frames around it, brought to its time.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "capture/develop.hpp"
+#include "capture/lazy_basis.hpp"
+#include "capture/motion_quality.hpp"
+
+namespace ols {
+
+// What one target is made of.
+struct TargetFrames {
+    uint32_t index = 0;  // of the target
+    LazyBasis basis;
+    std::vector<std::shared_ptr<const Frame>> frames;  // by basis.choices
+    // The tracking frames that were recorded in frames_around(), in order. A target's may be among them or lost.
+    struct Tracking {
+        uint64_t number = 0;
+        std::shared_ptr<const Frame> frame;
+    };
+    std::vector<Tracking> tracking;
+    std::vector<uint64_t> lost_tracking;  // numbers
+};
+
+// Takes targets in their order. Every tracking frame's flow to its neighbours is found once, every basis frame made ready
+// to be warped once; what no later target needs is dropped, so that memory holds some two cycles of frames.
+class MotionDeveloper {
+  public:
+    // References must outlive the developer.
+    MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration, const NoiseModel& noise,
+                    DevelopOptions options, MotionQuality quality);
+    ~MotionDeveloper();
+
+    // Errors: those of Developer::develop, and frames too small for flow. Where no tracking frame is near, nothing moves
+    // and every pixel is masked (mask_misaligned).
+    Result<Target> develop(const TargetFrames& frames);
+
+    // Where the time went, of all targets so far, in seconds of the calling thread.
+    struct Times {
+        double flow = 0;    // tracking images, flow, confidence
+        double planes = 0;  // from frames to planes above black
+        double invert = 0;  // warp, inversion, variance
+    };
+    const Times& times() const { return times_; }
+
+  private:
+    template <typename Sample>
+    using PlanesByNumber = std::map<uint64_t, std::shared_ptr<const ColorPlanes<Sample>>>;
+
+    Result<MotionPath> find_path(const TargetFrames& frames);
+    template <typename Sample, typename Sum>
+    AlignedRows<Sample, Sum> align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
+                                   PlanesByNumber<Sample>& known);
+    Result<AlignedFrames> align(const TargetFrames& frames);
+
+    const Sequence& sequence_;
+    const CameraCalibration& calibration_;
+    const DevelopOptions options_;
+    const MotionQuality quality_;
+    Developer developer_;
+    TrackingFlows flows_;
+    std::optional<uint64_t> last_tracking_;  // whose image `flows_` has
+    PlanesByNumber<int16_t> short_planes_;
+    PlanesByNumber<float> float_planes_;
+    Times times_;
+};
+
+}  // namespace ols

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// Motion quality: how exactly motion is compensated, by presets on the front of error over time (docs/accuracy.md).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "reflectance/tracking_flows.hpp"
+#include "result.hpp"
+
+namespace ols {
+
+struct MotionQuality {
+    std::string name = "none";
+    // Without, frames are taken as they are.
+    bool compensates = false;
+    TrackingFlowOptions flow = {};
+    // Runs of eight pixels whose vectors lie that near to a line are warped along it (warp.hpp).
+    float line_tolerance_px = 0.02f;
+};
+
+// none, preview, standard, final.
+std::vector<std::string> motion_quality_names();
+
+// Error: no such quality; says which there are.
+Result<MotionQuality> motion_quality(const std::string& name);
+
+}  // namespace ols
