@@ -60,8 +60,8 @@ double weight_at(const Expression& expression, double time_us) {
     const auto& keys = expression.keys;
     if (keys.empty()) return 0;
     if (expression.period_us > 0) time_us -= std::floor(time_us / expression.period_us) * expression.period_us;
-    const auto after = std::upper_bound(keys.begin(), keys.end(), time_us,
-                                        [](double t, const WeightKey& k) { return t < k.time_us; });
+    const auto after =
+        std::upper_bound(keys.begin(), keys.end(), time_us, [](double t, const WeightKey& k) { return t < k.time_us; });
     if (after == keys.begin()) return after->weight;
     const WeightKey& before = *(after - 1);
     if (after == keys.end()) return before.weight;

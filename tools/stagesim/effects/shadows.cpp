@@ -135,9 +135,7 @@ uint64_t Shadows::apply(std::span<LightPacket> packets) const {
 }
 
 uint64_t Shadows::apply_on_lattice(std::span<LightPacket> packets, const Lattice& lattice) const {
-    const auto irradiance = [&](uint32_t i) -> float& {
-        return packets[i / packet_size].irradiance[i % packet_size];
-    };
+    const auto irradiance = [&](uint32_t i) -> float& { return packets[i / packet_size].irradiance[i % packet_size]; };
     std::vector<bool> facing(packets.size() * packet_size);
     for (const uint16_t i : lattice.points) facing[i] = irradiance(i) > 0;
     RayGatherer rays(packets);
