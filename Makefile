@@ -5,8 +5,8 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit hil fuzz-smoke fuzz mutation lint lint-fast \
-        format flash install clean
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil fuzz-smoke \
+        fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
 
@@ -23,9 +23,9 @@ host: setup ## build/host/bin/{stagectl,rf,stagesim}
 	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
 	@ninja -C $(HOST) --quiet
 
-checked: setup ## the unit tests and what they test, with ASan and UBSan, in build/checked
+checked: setup ## the unit and stability tests and what they test, with ASan and UBSan, in build/checked
 	@test -e $(CHECKED)/build.ninja || cmake -S . -B $(CHECKED) -G Ninja -DOLS_SANITIZE=ON >/dev/null
-	@ninja -C $(CHECKED) --quiet unit_tests
+	@ninja -C $(CHECKED) --quiet unit_tests stability_tests
 
 assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 	@python3 tools/stagesim/assets/fetch.py
@@ -33,13 +33,31 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit fuzz-smoke hil ## everything that needs no hardware
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@ctest --test-dir $(CHECKED) --output-on-failure -j2 --no-tests=error
 	@$(PYTHON) -m pytest -q tests/unit tests/oracle
 	@cd tools/stagesim/board && npm test --silent
+
+stability: checked ## the hard cases: naive method, ours, derived bound (docs/stability.md)
+	@$(PYTHON) tests/stability/table.py --check
+	@$(PYTHON) -m pytest -q tests/stability
+
+benchmarks: setup
+	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
+	@ninja -C $(HOST) --quiet benchmarks
+
+bench: benchmarks ## what accuracy costs (SUBJECT=name for one subject): out/bench, docs/accuracy.md
+	@$(PYTHON) tests/bench/bench.py $(if $(SUBJECT),--subject $(SUBJECT))
+
+bench-smoke: benchmarks ## every benchmark once at tiny sizes, and the tests of their page
+	@$(PYTHON) -m pytest -q tests/bench
+
+noise: all ## Wenger's SNR comparison on the virtual stage, and what designed bases gain: out/bench, docs/bases.md
+	@$(PYTHON) tests/bench/snr.py --out out/bench --page docs/bases.md
+	@$(PYTHON) tests/bench/basis_gain.py --out out/bench --plot docs/images/basis_gain.png --page docs/bases.md
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture

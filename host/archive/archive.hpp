@@ -5,8 +5,9 @@
 //   take.rfa/manifest.json             what the take is, its lamps, and what else is known; rewritten by rename
 //   take.rfa/journal.jsonl             one fsynced line an event: begin, target (file, bytes, CRC-32), missing, end
 //   take.rfa/lights.lp                 the lamps as lamp_000 ... and their directions, for other programs
-//   take.rfa/cam0/target_000000.exr    tiled, scene-linear, three parts: "lamps" (layers lamp_000.Y, or .R .G .B),
-//                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known)
+//   take.rfa/cam0/target_000000.exr    tiled, scene-linear, parts: "lamps" (layers lamp_000.Y, or .R .G .B),
+//                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known),
+//                                      "noise_gain" (Y, FLOAT; left out when no sample was filled in)
 //
 // A target counts only when its journal line is complete and its file agrees with it. A target's file gets its name
 // after its bytes are on the disk, and its journal line after that.
@@ -27,10 +28,12 @@ namespace ols {
 
 // The bits of a mask sample.
 enum MaskBit : uint32_t {
-    mask_saturated = 1,  // a sample that this lamp value rests on was at or above white
-    mask_missing = 2,    // a slot was missing
-    mask_outside = 4,    // outside the user's mask (ingest)
-    mask_clamped = 8,    // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
+    mask_saturated = 1,   // a sample that these lamp values would rest on was at or above white, and was left out
+    mask_missing = 2,     // a slot was missing
+    mask_outside = 4,     // outside the user's mask (ingest)
+    mask_clamped = 8,     // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
+    mask_estimated = 16,  // what was left did not determine the lamp values: a prior did, which the provenance names
+    mask_unsolved = 32,   // nothing did; the lamp values are 0
 };
 
 // One output frame of one camera: all OLAT values. Planes are row-major, top to bottom.
@@ -40,8 +43,11 @@ struct Target {
     Cfa cfa = Cfa::none;  // a mosaic stays a mosaic; Cfa::rgb has three planes a lamp
     // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
     std::vector<std::vector<float>> lamps;
-    std::vector<uint32_t> mask;      // [y * width + x], MaskBit
-    std::vector<float> variance;     // [y * width + x] of one lamp value, mean over lamps; empty if not known
+    std::vector<uint32_t> mask;   // [y * width + x], MaskBit
+    std::vector<float> variance;  // [y * width + x] of one lamp value, mean over lamps; empty if not known
+    // [y * width + x]: noise variance of a lamp value over what it is with no sample masked, mean over lamps; 0 where not
+    // solved. Empty if no sample of the target was filled in.
+    std::vector<float> noise_gain;
     std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
     nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
 

@@ -157,6 +157,7 @@ void write_plane(Imf::TiledOutputPart part, Imf::PixelType type, const void* sam
 Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, const PlaneSource& source) {
     std::vector<Imf::Header> headers = {lamps_header(info, head), data_header(info, head, "mask", Imf::UINT)};
     if (!head.variance.empty()) headers.push_back(data_header(info, head, "variance", Imf::FLOAT));
+    if (!head.noise_gain.empty()) headers.push_back(data_header(info, head, "noise_gain", Imf::FLOAT));
     std::vector<uint32_t> mask = head.mask;
     mask.resize(size_t(head.width) * head.height);
     const auto channels = plane_channels(int(info.lights.size()), head.cfa);
@@ -167,7 +168,9 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
                                                               : write_lamps<float>(lamps, head, channels, source, mask);
     if (!written) return written;
     write_plane(Imf::TiledOutputPart(file, 1), Imf::UINT, mask.data(), head);
-    if (!head.variance.empty()) write_plane(Imf::TiledOutputPart(file, 2), Imf::FLOAT, head.variance.data(), head);
+    int part = 2;
+    for (const auto* plane : {&head.variance, &head.noise_gain})
+        if (!plane->empty()) write_plane(Imf::TiledOutputPart(file, part++), Imf::FLOAT, plane->data(), head);
     return Done{};
 }
 
@@ -222,7 +225,7 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
     if (window.min != Imath::V2i(0, 0)) return fail("'" + path + "' has a data window that does not begin at 0, 0");
     target.width = window.max.x + 1;
     target.height = window.max.y + 1;
-    for (const char* name : {"mask", "variance"})
+    for (const char* name : {"mask", "variance", "noise_gain"})
         if (const int p = find_part(file, name); p >= 0 && file.header(p).dataWindow() != window)
             return fail("'" + path + "' has parts of different sizes");
     target.provenance = nlohmann::json::parse(string_attribute(header, "provenance"), nullptr, false);
@@ -303,6 +306,7 @@ Result<Target> read_target_box(const std::string& path, const TakeInfo& info, Bo
         for (auto& plane : target.lamps) crop(plane, tiles, box);
         read_plane(file, "mask", Imf::UINT, target.mask, tiles, box);
         read_plane(file, "variance", Imf::FLOAT, target.variance, tiles, box);
+        read_plane(file, "noise_gain", Imf::FLOAT, target.noise_gain, tiles, box);
         target.width = box.width;
         target.height = box.height;
         return head;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A target as an OpenEXR file of three parts: lamps, mask, variance.
+// A target as an OpenEXR file of its parts: lamps, mask, variance, noise gain.
 #pragma once
 
 #include <string>

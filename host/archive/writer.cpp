@@ -121,6 +121,7 @@ Status ArchiveWriter::write_target(const Target& target) {
     head.cfa = target.cfa;
     head.mask = target.mask;
     head.variance = target.variance;
+    head.noise_gain = target.noise_gain;
     head.missing_lamps = target.missing_lamps;
     head.provenance = target.provenance;
     return write_target(head, [&](int plane, const Box& box, float* out) -> Status {

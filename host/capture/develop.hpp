@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "archive/archive.hpp"
+#include "reflectance/row_filler.hpp"
 #include "stage/calibration.hpp"
 #include "stage/sequence.hpp"
 
@@ -16,17 +17,51 @@ namespace ols {
 struct CycleFrames {
     uint32_t cycle = 0;
     std::vector<std::shared_ptr<const Frame>> slots;  // by slot; null where the slot is missing
+    // By slot, frames of the same slot in the neighbouring cycles that may stand in for it; empty when none may.
+    std::vector<std::vector<std::shared_ptr<const Frame>>> neighbours;
 };
 
 // Slots of the basis that have no frame.
 std::vector<int> missing_basis_slots(const CycleFrames& frames, const Sequence& sequence);
 
-// Inverts the cycle into r (docs/architecture.md, "Units"). The whole part of the black level is subtracted before the
+struct DevelopOptions {
+    Estimate estimate = Estimate::none;
+    std::vector<LightPosition> lamps;  // of the sphere; for an estimate
+};
+
+// Inverts cycles into r (docs/architecture.md, "Units"). The whole part of the black level is subtracted before the
 // inversion, so that counts stay integers and their sums exact, and the rest after it, which is the same since the
 // inversion is linear. The variance plane is the camera's noise carried through the inversion; frames of floats, which
-// come from a camera without noise, have none. Saturated samples mark their pixel.
-// A slot that is missing: with the single basis its lamp is missing; with a multiplexed one every lamp rests on it, and
-// the target cannot be made: an error that names the slots.
+// come from a camera without noise, have none.
+//
+// A row of the basis is the mean of its slots that were recorded, without the samples that saturated; where it has none,
+// of the neighbouring cycles' frames of the same slots; where none of these is there either, the sample is masked, and
+// filled with what the other rows, and if asked for the prior, say of it (reflectance/fill_model.hpp). The target's mask
+// and noise gain tell which pixels that was, its provenance ("masked") how many and how far they may be off. A pixel that
+// is not solved is 0 under every lamp. With a basis that gives each row an image of its own, and no estimate, a lost slot is
+// a missing lamp, and a saturated sample stands as it is, a lower bound.
+class Developer {
+  public:
+    // References must outlive the developer.
+    Developer(const Sequence& sequence, const CameraCalibration& calibration, const NoiseModel& noise,
+              DevelopOptions options = {});
+    ~Developer();
+
+    // Error: slots are missing that the others cannot replace; it names them and says what to do.
+    Result<Target> develop(const CycleFrames& frames);
+
+  private:
+    FillCache& fills();  // made when the first sample is masked
+
+    const Sequence& sequence_;
+    const CameraCalibration& calibration_;
+    const NoiseModel noise_;
+    const DevelopOptions options_;
+    FillModel model_;
+    std::unique_ptr<FillCache> fills_;
+};
+
+// One cycle, without estimates.
 Result<Target> develop_cycle(const CycleFrames& frames, const Sequence& sequence, const CameraCalibration& calibration,
                              const NoiseModel& noise);
 

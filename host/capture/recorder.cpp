@@ -231,8 +231,8 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
     return board.start();
 }
 
-size_t frames_in_flight(const Sequence& sequence) {
-    return 3 * sequence.slots.size() + 4 * options_for(sequence).reorder_frames;
+size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
+    return (3 + cycles_kept) * sequence.slots.size() + 4 * options_for(sequence).reorder_frames;
 }
 
 Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
@@ -243,10 +243,11 @@ Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& s
     const uint64_t dropped_before = camera.dropped();
     if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
 
-    EventQueue<Event> queue(frames_in_flight(sequence) + 64);
+    const size_t in_flight = frames_in_flight(sequence, sink.cycles_kept);
+    EventQueue<Event> queue(in_flight + 64);
     Recording recording(sequence, sink);
     {
-        CameraReader reader(camera, stage.cameras[0], black_counts, frames_in_flight(sequence), queue);
+        CameraReader reader(camera, stage.cameras[0], black_counts, in_flight, queue);
         BoardLog log(
             board, reader.arrivals(), stop, [&](LogNews news) { queue.push(std::move(news)); },
             [&](std::string why) { queue.push(LogEnd{std::move(why)}); });

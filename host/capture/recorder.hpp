@@ -23,6 +23,7 @@ struct RecordSink {
     std::function<void(std::shared_ptr<const Frame>)> frame;
     std::function<void(const MissingSlot&)> missing;
     std::function<void(uint64_t decided, uint64_t total)> progress;  // every trigger below `decided` has had its call
+    size_t cycles_kept = 0;  // whose frames the sink holds besides the one being developed and the one being gathered
 };
 
 struct RecordReport {
@@ -34,9 +35,9 @@ struct RecordReport {
     std::string board_end;    // why the board's log ended before the sequence did; empty when it did not
 };
 
-// Frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof) and
-// two reorder windows.
-size_t frames_in_flight(const Sequence& sequence);
+// Frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof), those
+// that the sink keeps besides, and two reorder windows.
+size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
 
 // Loads, arms and starts the sequence as its playback says; after that the board plays, or waits for an edge. The error is the
 // board's own, or says what a latched fault was.

@@ -9,7 +9,6 @@
 #include <numeric>
 #include <thread>
 
-#include "capture/develop.hpp"
 #include "capture/event_queue.hpp"
 #include "capture/missing_ranges.hpp"
 
@@ -45,6 +44,8 @@ nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence
     json["basis_slots"] = sequence.basis.rows;
     json["frames"] = used;
     json["missing_slots"] = missing_basis_slots(frames, sequence);
+    for (size_t s = 0; s < frames.neighbours.size(); ++s)
+        if (!frames.neighbours[s].empty()) json["slots_from_neighbours"].push_back(s);
     return json;
 }
 
@@ -58,11 +59,11 @@ double noise_gain(const Basis& basis) {
 class TakeWriter {
   public:
     TakeWriter(const Sequence& sequence, const StageConfig& stage, const Calibration& calibration,
-               ArchiveWriter& archive)
+               const TakeMasks& masks, ArchiveWriter& archive)
         : sequence_(sequence),
-          stage_(stage),
-          calibration_(calibration),
+          masks_(masks),
           archive_(archive),
+          developer_(sequence, calibration.cameras[0], stage.cameras[0].noise, {masks.estimate, stage.lamps}),
           missing_(sequence),
           develop_thread_([this] { develop(); }),
           write_thread_([this] { write(); }) {}
@@ -77,13 +78,11 @@ class TakeWriter {
     }
     void add_missing(const MissingSlot& slot) { missing_.add(slot); }
 
-    // Hands on the cycles whose triggers are all decided.
+    // Hands on the cycles whose triggers are all decided, and with neighbours those of the cycle after too.
     void hand_on(uint64_t decided) {
-        for (; (next_cycle_ + 1) * sequence_.slots.size() <= decided; ++next_cycle_) {
-            CycleFrames frames = std::move(gather(uint32_t(next_cycle_)));
-            gathered_.erase(uint32_t(next_cycle_));
-            to_develop_.push(std::move(frames));
-        }
+        for (; next_cycle_ < cycles() && (next_cycle_ + 1 + ahead_of(next_cycle_)) * sequence_.slots.size() <= decided;
+             ++next_cycle_)
+            hand_on_next();
     }
 
     // Waits until everything handed on is written, and completes the report.
@@ -98,6 +97,27 @@ class TakeWriter {
     nlohmann::json missing_json() const { return missing_.to_json(); }
 
   private:
+    uint64_t cycles() const { return uint64_t(sequence_.config.cycles); }
+    uint64_t ahead_of(uint64_t cycle) const { return masks_.fill_from_neighbours && cycle + 1 < cycles() ? 1 : 0; }
+
+    void hand_on_next() {
+        const auto cycle = uint32_t(next_cycle_);
+        if (!masks_.fill_from_neighbours) {
+            to_develop_.push(std::move(gather(cycle)));
+            gathered_.erase(cycle);
+            return;
+        }
+        CycleFrames frames = gather(cycle);
+        frames.neighbours.resize(frames.slots.size());
+        for (const int slot : missing_basis_slots(frames, sequence_))
+            for (const uint64_t other : {next_cycle_ - 1, next_cycle_ + 1})
+                if (const auto kept = gathered_.find(uint32_t(other)); kept != gathered_.end())
+                    if (const auto& frame = kept->second.slots[size_t(slot)])
+                        frames.neighbours[size_t(slot)].push_back(frame);
+        if (cycle > 0) gathered_.erase(cycle - 1);
+        to_develop_.push(std::move(frames));
+    }
+
     CycleFrames& gather(uint32_t cycle) {
         CycleFrames& frames = gathered_[cycle];
         frames.cycle = cycle;
@@ -109,15 +129,14 @@ class TakeWriter {
         while (auto frames = to_develop_.pop()) {
             const auto start = Clock::now();
             Outcome outcome{frames->cycle, nullptr, "", provenance_of(*frames, sequence_)};
-            auto target = develop_cycle(*frames, sequence_, calibration_.cameras[0], stage_.cameras[0].noise);
+            auto target = developer_.develop(*frames);
             if (target.ok()) {
                 outcome.target = std::make_unique<Target>(std::move(*target));
                 outcome.target->index = frames->cycle;
-                const auto& mask = outcome.target->mask;
-                const auto saturated =
-                    std::count_if(mask.begin(), mask.end(), [](uint32_t m) { return (m & mask_saturated) != 0; });
-                outcome.detail["saturated_pixels"] = saturated;
-                report_.saturated_share = std::max(report_.saturated_share, double(saturated) / double(mask.size()));
+                if (outcome.target->provenance.is_object()) outcome.detail.update(outcome.target->provenance);
+                outcome.detail["saturated_pixels"] = count(mask_saturated, *outcome.target, report_.saturated_share);
+                outcome.detail["estimated_pixels"] = count(mask_estimated, *outcome.target, report_.estimated_share);
+                outcome.detail["unsolved_pixels"] = count(mask_unsolved, *outcome.target, report_.unsolved_share);
                 outcome.target->provenance = outcome.detail;
             } else {
                 outcome.why = target.error().message;
@@ -126,6 +145,14 @@ class TakeWriter {
             report_.seconds_develop += seconds_since(start);
             to_write_.push(std::move(outcome));
         }
+    }
+
+    // The pixels with a mask bit; raises `worst` to their share.
+    static int64_t count(MaskBit bit, const Target& target, double& worst) {
+        const auto& mask = target.mask;
+        const auto pixels = std::count_if(mask.begin(), mask.end(), [bit](uint32_t bits) { return (bits & bit) != 0; });
+        worst = std::max(worst, double(pixels) / double(mask.size()));
+        return pixels;
     }
 
     void write() {
@@ -142,9 +169,9 @@ class TakeWriter {
     }
 
     const Sequence& sequence_;
-    const StageConfig& stage_;
-    const Calibration& calibration_;
+    const TakeMasks masks_;
     ArchiveWriter& archive_;
+    Developer developer_;
     MissingRanges missing_;
     std::map<uint32_t, CycleFrames> gathered_;
     uint64_t next_cycle_ = 0;
@@ -179,11 +206,11 @@ std::optional<double> measured_black(const Calibration& calibration) {
 }
 
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                            const Calibration& calibration, ArchiveWriter& archive, const std::atomic<bool>& stop,
-                            const std::function<void(const Frame&)>& identified,
+                            const Calibration& calibration, const TakeMasks& masks, ArchiveWriter& archive,
+                            const std::atomic<bool>& stop, const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress) {
     const auto start = Clock::now();
-    TakeWriter writer(sequence, stage, calibration, archive);
+    TakeWriter writer(sequence, stage, calibration, masks, archive);
     const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
                               identified(*frame);
                               writer.add_frame(std::move(frame));
@@ -192,7 +219,8 @@ Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequen
                           [&](uint64_t decided, uint64_t total) {
                               writer.hand_on(decided);
                               progress(decided, total);
-                          }};
+                          },
+                          masks.fill_from_neighbours ? size_t(2) : size_t(0)};
     auto record = record_take(board, camera, sequence, stage, measured_black(calibration), sink, stop);
     writer.finish();
     if (!record.ok()) return record.error();

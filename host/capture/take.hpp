@@ -7,6 +7,7 @@
 #include <string>
 
 #include "archive/archive.hpp"
+#include "capture/develop.hpp"
 #include "capture/recorder.hpp"
 #include "stage/calibration.hpp"
 
@@ -15,10 +16,19 @@ namespace ols {
 struct TakeReport {
     RecordReport record;
     int targets_written = 0, targets_missing = 0;
-    double saturated_share = 0;  // of a target's pixels that rest on a saturated sample, in the worst target
+    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, and not solved.
+    double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
     // Where the time went: of the whole take, and busy in each thread.
     double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
     std::string write_error;  // the first target that could not be written, and why; empty when all were
+};
+
+// What becomes of slots that were lost and samples that saturated.
+struct TakeMasks {
+    // Lost slots of the basis take the frames of the same slot in the cycle before and the one after, their mean where both
+    // are there: for subjects that hold still. Costs a cycle of delay and the memory of two more.
+    bool fill_from_neighbours = false;
+    Estimate estimate = Estimate::none;
 };
 
 // Threads: the camera's, the board's, the caller's, which identifies, one that develops, one that writes. Each hands on
@@ -26,8 +36,8 @@ struct TakeReport {
 // `identified` sees every frame that has its slot, in the caller's thread. `info` gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
 // Errors: the board cannot be started. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                            const Calibration& calibration, ArchiveWriter& archive, const std::atomic<bool>& stop,
-                            const std::function<void(const Frame&)>& identified,
+                            const Calibration& calibration, const TakeMasks& masks, ArchiveWriter& archive,
+                            const std::atomic<bool>& stop, const std::function<void(const Frame&)>& identified,
                             const std::function<void(uint64_t decided, uint64_t total)>& progress);
 
 // The mean black level of a calibration, for the optical code; nothing for a nominal one.

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Two exact inversions: a plan of additions where the basis has a known structure (hadamard_plan.hpp), and for any other
-// a small integer matrix product, tiled so that a tile of all rows stays in the second-level cache (159 rows x 256
-// samples x 4 bytes = 163 KB) while every lamp is summed from it. Both give the same bits.
+// A plan of additions where the basis has a known structure (hadamard_plan.hpp); a factor where each row is an image of
+// its own (single lamps); for any other a matrix product by OpenBLAS, in blocks of samples that stay in the second-level
+// cache (159 rows x 256 samples x 4 bytes = 163 KB). Integer weights are exact in all: sums of whole numbers below 2^24
+// are exact in float, whatever their order, and below 2^53 in double.
 #include "reflectance/demultiplex.hpp"
+
+#include <cblas.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,80 +17,19 @@
 #include <thread>
 #include <vector>
 
+#include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
 
 namespace ols {
 
 namespace {
 
-constexpr size_t block_samples = 256;
-constexpr int lamps_at_once = 4;  // share each load of a row
+constexpr size_t block_samples = 8 * tile_samples;
 
-// A vector of what row samples are summed in: one AVX2 register, two of SSE2. Tiles are aligned for their elements only.
-template <typename Sum>
-struct Arithmetic {
-    typedef Sum Vector __attribute__((vector_size(32), aligned(sizeof(Sum)), may_alias));
-};
-
-// sums[lamp][p] of four lamps over one tile[row * block_samples + p]; weights[row * lamps_at_once + lamp].
-template <typename Sum>
-__attribute__((always_inline)) inline void sum_tile(const Sum* tile, int rows, const Sum* weights,
-                                                    Sum (*sums)[block_samples]) {
-    using Vector = typename Arithmetic<Sum>::Vector;
-    for (size_t p = 0; p < block_samples; p += sizeof(Vector) / sizeof(Sum)) {
-        // Four names instead of an array: the compiler keeps these in registers.
-        Vector sum0{}, sum1{}, sum2{}, sum3{};
-        for (int r = 0; r < rows; ++r) {
-            const Vector y = *reinterpret_cast<const Vector*>(tile + size_t(r) * block_samples + p);
-            const auto* w = weights + size_t(r) * lamps_at_once;
-            sum0 += y * w[0], sum1 += y * w[1], sum2 += y * w[2], sum3 += y * w[3];
-        }
-        *reinterpret_cast<Vector*>(sums[0] + p) = sum0;
-        *reinterpret_cast<Vector*>(sums[1] + p) = sum1;
-        *reinterpret_cast<Vector*>(sums[2] + p) = sum2;
-        *reinterpret_cast<Vector*>(sums[3] + p) = sum3;
-    }
-}
-
-template <typename Sum>
-void sum_tile_portable(const Sum* tile, int rows, const Sum* weights, Sum (*sums)[block_samples]) {
-    sum_tile<Sum>(tile, rows, weights, sums);
-}
-
-#if defined(__x86_64__)
-template <typename Sum>
-__attribute__((target("avx2"))) void sum_tile_avx2(const Sum* tile, int rows, const Sum* weights,
-                                                   Sum (*sums)[block_samples]) {
-    sum_tile<Sum>(tile, rows, weights, sums);
-}
-#endif
-
-// Chosen at run time: shipped binaries are built for the baseline processor. Integer sums agree by nature; double sums
-// agree because each lane adds its rows in the same order and products are not fused.
-template <typename Sum>
-auto best_sum_tile() {
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) return sum_tile_avx2<Sum>;
-#endif
-    return sum_tile_portable<Sum>;
-}
-
-// Weights as the kernel reads them: [group of four lamps][row][lamp in group], zero beyond the last lamp.
-template <typename Sum>
-std::vector<Sum> grouped_weights(const Basis& basis) {
-    const int groups = (basis.images() + lamps_at_once - 1) / lamps_at_once;
-    std::vector<Sum> weights(size_t(groups) * basis.rows * lamps_at_once);
-    for (int r = 0; r < basis.rows; ++r)
-        for (int i = 0; i < basis.images(); ++i)
-            weights[(size_t(i / lamps_at_once) * basis.rows + r) * lamps_at_once + i % lamps_at_once] =
-                basis.has_integers() ? Sum(basis.weight(r, i)) : Sum(basis.inverse(r, i));
-    return weights;
-}
-
-// Runs `threads` workers, each calling its own work(begin, count) for tiles it takes from a shared counter. Tiles are
+// Runs `threads` workers, each calling its own work(begin, count) for blocks it takes from a shared counter. Blocks are
 // independent, so who takes which does not matter.
 template <typename MakeWorker>
-void for_each_tile(size_t samples, int threads, const MakeWorker& make_worker) {
+void for_each_block(size_t samples, int threads, const MakeWorker& make_worker) {
     std::atomic<size_t> next{0};
     const auto run = [&] {
         auto work = make_worker();
@@ -111,7 +53,6 @@ std::vector<float> sample_factors(const Basis& basis, size_t samples, const Demu
 struct LaidOutPlan {
     std::vector<int8_t> weights;  // of the basis that it was made for
     HadamardPlan plan;
-    SumCode code;
 };
 
 std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
@@ -121,48 +62,152 @@ std::shared_ptr<const LaidOutPlan> plan_for(const Basis& basis) {
     const auto known = plans.find(basis.name);
     if (known != plans.end() && (!known->second || known->second->weights == basis.weights)) return known->second;
     std::shared_ptr<const LaidOutPlan> made;
-    if (auto plan = hadamard_plan(basis)) {
-        SumCode code = lay_out(plan->plan, {plan->extra_row});
-        made = std::make_shared<LaidOutPlan>(LaidOutPlan{basis.weights, std::move(*plan), std::move(code)});
-    }
+    if (auto plan = hadamard_plan(basis))
+        made = std::make_shared<LaidOutPlan>(LaidOutPlan{basis.weights, std::move(*plan)});
     return plans[basis.name] = made;
 }
 
 void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const int32_t* const> rows,
                          size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
-    const HadamardJob job{&made.plan, &made.code, {}, rows, lamps, {}, factors};
-    for_each_tile(samples, options.threads, [&] {
-        return [&, scratch = std::make_unique<TileScratch>(made.code)](size_t begin, size_t count) {
+    const HadamardJob job{
+        .plan = &made.plan, .rows32 = {rows}, .floats = {lamps}, .factors = factors, .filler = options.filler};
+    for_each_block(samples, options.threads, [&] {
+        return [&, scratch = std::make_unique<TileScratch>(made.plan)](size_t begin, size_t count) {
             TileCounts counts;
             invert_tiles(job, begin, begin + count, *scratch, counts);
         };
     });
 }
 
-template <typename Sum, typename Sample>
-void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
-                         std::span<float* const> lamps, const DemultiplexOptions& options) {
-    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
-    assert(options.gain.empty() || options.gain.size() == samples);
-    const auto weights = grouped_weights<Sum>(basis);
-    const auto kernel = best_sum_tile<Sum>();
-    const auto factors = sample_factors(basis, samples, options);
+// The inversion of any basis as a matrix, images x rows, in both precisions.
+struct InverseMatrix {
+    std::vector<float> floats;
+    std::vector<double> doubles;
+    double counts_limit = 0;  // below it, sums of counts are exact in float
 
-    const auto make_worker = [&] {
-        return [&, tile = std::vector<Sum>(rows.size() * block_samples)](size_t begin, size_t count) mutable {
-            for (size_t r = 0; r < rows.size(); ++r)
-                std::copy_n(rows[r] + begin, count, tile.data() + r * block_samples);
-            for (int first = 0; first < basis.images(); first += lamps_at_once) {
-                Sum sums[lamps_at_once][block_samples];
-                kernel(tile.data(), basis.rows, weights.data() + size_t(first) * basis.rows, sums);
-                for (int k = 0; k < std::min(lamps_at_once, basis.images() - first); ++k)
-                    for (size_t p = 0; p < count; ++p)
-                        lamps[first + k][begin + p] = float(sums[k][p]) * factors[begin + p];
+    explicit InverseMatrix(const Basis& basis) {
+        double largest = 0;  // sum of the magnitudes of an image's weights
+        for (int i = 0; i < basis.images(); ++i) {
+            double magnitude = 0;
+            for (int r = 0; r < basis.rows; ++r) {
+                doubles.push_back(basis.has_integers() ? basis.weight(r, i) : basis.inverse(r, i));
+                magnitude += std::abs(doubles.back());
             }
+            largest = std::max(largest, magnitude);
+        }
+        floats.assign(doubles.begin(), doubles.end());
+        if (basis.has_integers()) counts_limit = double(1 << 24) / largest;
+    }
+};
+
+// All rows of up to block_samples samples, inverted.
+template <typename Real>
+struct Block {
+    std::vector<Real> rows, images;
+
+    explicit Block(const Basis& basis)
+        : rows(size_t(basis.rows) * block_samples), images(size_t(basis.images()) * block_samples) {}
+
+    template <typename Sample>
+    void invert(const Basis& basis, const std::vector<Real>& matrix, const std::vector<const Sample*>& from,
+                size_t count) {
+        for (size_t r = 0; r < from.size(); ++r) std::copy_n(from[r], count, rows.data() + r * block_samples);
+        const auto product = [&](auto gemm) {
+            gemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, basis.images(), int(block_samples), basis.rows, 1,
+                 matrix.data(), basis.rows, rows.data(), int(block_samples), 0, images.data(), int(block_samples));
+        };
+        if constexpr (std::is_same_v<Real, float>)
+            product(cblas_sgemm);
+        else
+            product(cblas_dgemm);
+    }
+};
+
+// Copies the rows of a block whose masked samples, if it has any, are filled; from: the rows at the block's begin.
+class FilledBlock {
+  public:
+    FilledBlock(const Basis& basis, const SampleFiller* filler)
+        : filler_(filler),
+          filled_(filler ? size_t(basis.rows) * block_samples : 0),
+          tile_(size_t(basis.rows) * tile_samples) {}
+
+    void fill(std::vector<const int32_t*>& from, size_t begin, size_t count) {
+        if (!filler_) return;
+        for (size_t r = 0; r < from.size(); ++r) {
+            int32_t* const to = filled_.data() + r * block_samples;
+            if (from[r])
+                std::copy_n(from[r], count, to);
+            else
+                std::fill_n(to, count, masked_sample<int32_t>);
+            from[r] = to;
+        }
+        for (size_t at = 0; at < count; at += tile_samples)
+            fill_tile(from.size(), begin, at, std::min(tile_samples, count - at));
+    }
+
+  private:
+    void fill_tile(size_t rows, size_t begin, size_t at, size_t count) {
+        bool masked = false;
+        for (size_t r = 0; r < rows; ++r) {
+            const int32_t* const row = filled_.data() + r * block_samples + at;
+            std::fill(std::copy_n(row, count, tile_.data() + r * tile_samples), tile_.data() + (r + 1) * tile_samples,
+                      0);
+            masked = masked || std::find(row, row + count, masked_sample<int32_t>) != row + count;
+        }
+        if (!masked) return;
+        filler_->fill(tile_.data(), begin + at, count);
+        for (size_t r = 0; r < rows; ++r)
+            std::copy_n(tile_.data() + r * tile_samples, count, filled_.data() + r * block_samples + at);
+    }
+
+    const SampleFiller* filler_;
+    std::vector<int32_t> filled_, tile_;
+};
+
+double largest_count(const std::vector<const int32_t*>& rows, size_t count) {
+    double largest = 0;
+    for (const int32_t* row : rows)
+        for (size_t p = 0; p < count; ++p) largest = std::max(largest, std::abs(double(row[p])));
+    return largest;
+}
+
+template <typename Sample>
+void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
+                           std::span<float* const> lamps, const DemultiplexOptions& options) {
+    openblas_set_num_threads(1);  // blocks are what runs in parallel
+    const InverseMatrix matrix(basis);
+    const bool one_row_each = is_one_image_a_row(basis);
+    const auto factors = sample_factors(basis, samples, options);
+    const auto make_worker = [&] {
+        return [&, small = Block<float>(basis), large = Block<double>(basis),
+                filled = FilledBlock(basis, options.filler)](size_t begin, size_t count) mutable {
+            std::vector<const Sample*> from;
+            for (const Sample* row : rows) from.push_back(row ? row + begin : nullptr);
+            bool fits_float = false;
+            if constexpr (std::is_same_v<Sample, int32_t>) {
+                filled.fill(from, begin, count);
+                fits_float = largest_count(from, count) < matrix.counts_limit;
+            }
+            if (one_row_each) {
+                for (size_t i = 0; i < lamps.size(); ++i)
+                    for (size_t p = 0; p < count; ++p)
+                        lamps[i][begin + p] =
+                            float(matrix.doubles[i * rows.size() + i] * double(from[i][p])) * factors[begin + p];
+                return;
+            }
+            const auto store = [&](const auto& images) {
+                for (size_t i = 0; i < lamps.size(); ++i)
+                    for (size_t p = 0; p < count; ++p)
+                        lamps[i][begin + p] = float(images[i * block_samples + p]) * factors[begin + p];
+            };
+            if (fits_float)
+                small.invert(basis, matrix.floats, from, count), store(small.images);
+            else
+                large.invert(basis, matrix.doubles, from, count), store(large.images);
         };
     };
-    for_each_tile(samples, options.threads, make_worker);
+    for_each_block(samples, options.threads, make_worker);
 }
 
 }  // namespace
@@ -170,17 +215,17 @@ void demultiplex_samples(const Basis& basis, std::span<const Sample* const> rows
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options) {
     assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
+    assert(options.gain.empty() || options.gain.size() == samples);
     if (const auto made = plan_for(basis))
         demultiplex_by_plan(*made, basis, rows, samples, lamps, options);
-    else if (basis.has_integers())
-        demultiplex_samples<int32_t>(basis, rows, samples, lamps, options);
     else
-        demultiplex_samples<double>(basis, rows, samples, lamps, options);
+        demultiplex_by_matrix(basis, rows, samples, lamps, options);
 }
 
 void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
                  const DemultiplexOptions& options) {
-    demultiplex_samples<double>(basis, rows, samples, lamps, options);
+    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images() && !options.filler);
+    demultiplex_by_matrix(basis, rows, samples, lamps, options);
 }
 
 void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out) {

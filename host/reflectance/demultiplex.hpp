@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 
+#include "reflectance/masked_sample.hpp"
 #include "stage/basis.hpp"
 #include "stage/stage.hpp"
 
@@ -17,17 +18,18 @@ struct DemultiplexOptions {
     // Multiplied into every lamp value of a sample: from counts to r it is 1 / (F t) (docs/architecture.md). Empty: 1.
     std::span<const float> gain;
     int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
+    // Asked for masked samples of int32_t rows (masked_sample.hpp). Without it no sample is masked and no row null.
+    const SampleFiller* filler = nullptr;
 };
 
 // lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
-// `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact in int32
-// when |counts| < 2^23: the weights of a lamp sum to at most 232 in magnitude (hadamard156, lamp 0), which suits every
-// camera of up to 16 bits. A basis without integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
+// `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact when
+// |counts| < 2^23, which suits every camera of up to 16 bits. A basis without integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options = {});
 
-// The same for sources that do not quantise: sums in double, rows in order, so that the bits do not depend on the
-// thread count or the SIMD path.
+// The same for sources that do not quantise: sums in double. Here and without integer weights the order of a sum is the
+// matrix library's, so that the last bits depend on its version and the processor.
 void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
                  const DemultiplexOptions& options = {});
 

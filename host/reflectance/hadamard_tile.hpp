@@ -6,48 +6,54 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "reflectance/hadamard_plan.hpp"
+#include "reflectance/masked_sample.hpp"
+#include "reflectance/planes.hpp"
 
 namespace ols {
 
-constexpr size_t tile_samples =
-    64;  // one cache line pair of int16 a row; all of a plan's places fit the nearest caches
-
 struct HadamardJob {
     const HadamardPlan* plan;
-    const SumCode* code;
-    // One of the two: a pointer a row.
-    std::span<const int16_t* const> rows16;
-    std::span<const int32_t* const> rows32;  // |counts| < 2^23
-    // One of the two: a pointer a lamp. Sums are z itself; floats are z times factor.
-    std::span<float* const> lamps;
-    std::span<int32_t* const> sums;
-    std::span<const float> factors;  // a sample each
+    // One of the two, a plane a row of the basis.
+    Planes<const int16_t> rows16 = {};
+    Planes<const int32_t> rows32 = {};  // |counts| < 2^23
+    // Any of these, a plane a lamp:
+    Planes<int32_t> sums = {};     // z itself
+    Planes<int16_t> shorts = {};   // z, the nearest there is where it does not fit; TileCounts::clipped counts these
+    Planes<float> floats = {};     // z times factor
+    Planes<uint16_t> halves = {};  // the same as IEEE half, to the nearest even; infinite from 65520
+    std::span<const float> factors = {};  // one a sample, for floats and halves
+    // Asked for the samples of every tile that has a masked one (masked_sample.hpp). Without it nothing is masked: the
+    // lowest value is a count like any other, and no row is null.
+    const SampleFiller* filler = nullptr;
 };
 
 struct TileCounts {
-    uint64_t tiles = 0, fallbacks = 0;  // inverted; of these, in 32 bits
+    uint64_t tiles = 0, fallbacks = 0, filled = 0;  // inverted; of these, in 32 bits; of all, with masked samples
+    uint64_t clipped = 0;                           // values of `shorts`
 };
 
 // Scratch of one thread.
 class TileScratch {
   public:
-    explicit TileScratch(const SumCode& code);
+    explicit TileScratch(const HadamardPlan& plan);
 
-    int16_t* short_places() { return places16_.data()->samples; }
-    int32_t* long_places() { return places32_.data()->samples; }
+    int16_t* short_places() { return short_places_.data()->samples; }
+    int32_t* long_places() { return long_places_.data()->samples; }
+    int16_t* copied_rows() { return copied_rows_.data()->samples; }
 
   private:
     template <typename Sample>
     struct alignas(64) Place {
         Sample samples[tile_samples];
     };
-    std::vector<Place<int16_t>> places16_;
-    std::vector<Place<int32_t>> places32_;
+    std::vector<Place<int16_t>> short_places_, copied_rows_;
+    std::vector<Place<int32_t>> long_places_;
 };
 
-// Inverts samples begin..end-1.
+// Inverts samples begin..end-1; `begin` is a multiple of tile_samples.
 void invert_tiles(const HadamardJob& job, size_t begin, size_t end, TileScratch& scratch, TileCounts& counts);
 
 // Names of the SIMD paths that this processor has, best first; and the choice of one for what follows (tests, bench).

@@ -104,6 +104,18 @@ std::vector<int> SumPlan::sums(std::vector<Terms> rows, int uses_min) {
     return numbers;
 }
 
+std::vector<int> SumPlan::append(const SumPlan& part, const std::vector<int>& inputs) {
+    assert(int(inputs.size()) == part.inputs());
+    std::vector<int> numbers = inputs;
+    for (Terms terms : part.all_sums()) {
+        for (Term& term : terms) term.value = numbers[size_t(term.value)];
+        numbers.push_back(sum(terms));
+    }
+    std::vector<int> outputs;
+    for (const int value : part.outputs()) outputs.push_back(numbers[size_t(value)]);
+    return outputs;
+}
+
 int SumPlan::additions() const {
     size_t additions = 0;
     for (const Terms& terms : sums_) additions += terms.size() - 1;

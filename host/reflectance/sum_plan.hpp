@@ -30,8 +30,11 @@ class SumPlan {
 
     // Adds many sums at once, sharing pairs: as long as some pair of terms (up to its common sign) occurs in at least
     // `uses_min` of them, the most frequent pair becomes a sum of its own (C. Paar, "Optimized arithmetic for
-    // Reed-Solomon encoders", 1997). Two uses save additions; three or more also save loads. Returns their numbers.
-    std::vector<int> sums(std::vector<Terms> rows, int uses_min = 3);
+    // Reed-Solomon encoders", 1997). Returns their numbers.
+    std::vector<int> sums(std::vector<Terms> rows, int uses_min = 2);
+
+    // Adds all sums of `part`, which takes the values `inputs` for its inputs; returns the numbers of its outputs.
+    std::vector<int> append(const SumPlan& part, const std::vector<int>& inputs);
 
     void add_output(int value) { outputs_.push_back(value); }
     const std::vector<int>& outputs() const { return outputs_; }

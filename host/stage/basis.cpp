@@ -11,6 +11,7 @@
 #include "stage/basis_inverse.hpp"
 #include "stage/hadamard.hpp"
 #include "stage/harmonics.hpp"
+#include "stage/projective_space.hpp"
 #include "stage/triangles.hpp"
 
 namespace ols {
@@ -95,6 +96,28 @@ Basis paley163_basis(int lamps) {
     return s_matrix_basis("paley163", paley(163), lamps);
 }
 
+// The 156 points and planes of PG(3, 5): 31 points on a plane, 6 on any two, so that N' N = 25 I + 6 J and N J = 31 J, and
+// N^-1 = (31 N' - 6 J) / 775: 25 where a lamp is lit, -6 where it is not. Among all lights of 31 lamps a row none leaves less
+// noise (stage/design_starts.hpp).
+Result<Basis> planes156_basis(int lamps) {
+    constexpr int dimension = 3, q = 5, lit_weight = 25, dark_weight = -6;
+    const auto points = projective_points(dimension, q, sphere_lamp_count);
+    if (lamps != int(points.size()))
+        return fail(
+            fmt::format("basis planes156 is for {} lamps and the stage has {} on its sphere: choose another basis",
+                        points.size(), lamps));
+    Basis basis = empty_basis("planes156", lamps, lamps);
+    show_first_lamps(basis, lamps);
+    for (size_t r = 0; r < points.size(); ++r)
+        for (size_t i = 0; i < points.size(); ++i) {
+            const bool lit = lies_on(points[i], points[r], q);
+            basis.levels[r * points.size() + i] = lit;
+            basis.weights[r * points.size() + i] = lit ? lit_weight : dark_weight;
+        }
+    basis.scale = 1 / 775.0;
+    return basis;
+}
+
 // Wenger 5.2: each triple stands for one light in the middle of its lamps; nothing is inverted, only divided by three.
 Basis triangle_basis(const std::vector<Vec3>& lamps) {
     const auto triples = north_triangles(lamps);
@@ -173,6 +196,7 @@ const std::vector<BasisKind>& basis_kinds() {
         {"single", "one lamp a row (Wenger 5.1)"},
         {"triangle", "each north-pointing triple of lamps is one light of the result (Wenger 5.2)"},
         {"triangle300", "all triples of neighbours, inverted to single lamps by least squares"},
+        {"planes156", "31 lamps a row, the planes of a projective space: least noise for 2 to 200 counts a lamp"},
         {"s159", "S-matrix of 159 rows, three columns to spare: a lost slot can be filled in"},
         {"hadamard156", "normalised Hadamard matrix of order 156 by Williamson"},
         {"s155", "S-matrix of 155 rows and lamps (Wenger 5.3); the last lamp stays dark"},
@@ -196,6 +220,7 @@ Result<Basis> find_basis(const std::string& name, const std::vector<LightPositio
     const auto directions = directions_of(lamps);
     const int count = int(lamps.size());
     if (name == "single") return single_basis(count);
+    if (name == "planes156") return planes156_basis(count);
     if (name == "s159") return for_lamps(count, 159, name, s159_basis);
     if (name == "paley163") return for_lamps(count, 163, name, paley163_basis);
     if (name == "s155") return for_lamps(count, 156, name, s155_basis);

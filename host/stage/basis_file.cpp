@@ -12,12 +12,14 @@
 #include <sstream>
 
 #include "stage/basis_inverse.hpp"
+#include "wire.h"
 
 namespace ols {
 
 namespace {
 
 constexpr int level_limit = 255;
+constexpr std::streamsize line_bytes_max = 64 * 1024;  // 255 and a comma for each of 256 lamps take 1 KB
 
 struct Lines {
     std::string path;
@@ -42,24 +44,49 @@ std::vector<std::string> words_of(std::string line) {
     return words;
 }
 
+// A level that is missing between commas must not let those behind it slip to other lamps.
+bool has_empty_cell(const std::string& line) {
+    constexpr const char* commas = ",;";
+    if (line.find_first_of(commas) == std::string::npos) return false;
+    for (size_t begin = 0;;) {
+        const size_t end = line.find_first_of(commas, begin);
+        if (line.find_first_not_of(" \t\r", begin) >= end) return true;
+        if (end == std::string::npos) return false;
+        begin = end + 1;
+    }
+}
+
+// The next line without its end; false at the end of the file.
+Result<bool> next_line(std::istream& file, Lines& at, std::string& line) {
+    line.resize(line_bytes_max);
+    file.getline(line.data(), line_bytes_max);
+    at.number++;
+    if (file.fail() && !file.eof())
+        return at.error(fmt::format("a line of more than {} bytes is no row of levels", line_bytes_max - 1));
+    line.resize(size_t(file.gcount()) - !file.eof());  // it counts the line's end, where there is one
+    return !(file.eof() && line.empty());
+}
+
 // `# level_max = N`; other comments say nothing.
 Status read_comment(const Lines& at, const std::string& line, int& level_max) {
     const auto words = words_of(line.substr(1));
     if (words.size() != 2 || words[0] != "level_max") return Done{};
     const auto value = whole_number(words[1]);
     if (!value || *value < 1 || *value > level_limit || (*value & (*value + 1)) != 0)
-        return at.error(fmt::format("level_max '{}' is none of 1, 3, 7 ... 255", words[1]));
+        return at.error(fmt::format("level_max '{:.20}' is none of 1, 3, 7 ... 255", words[1]));
     level_max = *value;
     return Done{};
 }
 
 Status read_row(const Lines& at, const std::vector<std::string>& words, Basis& basis) {
+    if (basis.rows == OLS_SLOTS_MAX)
+        return at.error(fmt::format("more rows than the {} slots that the board plays: remove some", OLS_SLOTS_MAX));
     if (int(words.size()) != basis.lamps)
         return at.error(fmt::format("{} levels where the stage has {} lamps on its sphere", words.size(), basis.lamps));
     for (const auto& word : words) {
         const auto value = whole_number(word);
         if (!value || *value < 0 || *value > level_limit)
-            return at.error(fmt::format("'{}' is no level: give whole numbers from 0 to {}", word, level_limit));
+            return at.error(fmt::format("'{:.20}' is no level: give whole numbers from 0 to {}", word, level_limit));
         basis.levels.push_back(uint8_t(*value));
     }
     basis.rows++;
@@ -76,14 +103,17 @@ Result<Basis> read_basis(const std::string& path, int lamps) {
     basis.lamps = lamps;
     int stated_max = 0;
     Lines at{path};
-    for (std::string line; std::getline(file, line);) {
-        at.number++;
+    for (std::string line;;) {
+        const auto more = next_line(file, at, line);
+        if (!more.ok()) return more.error();
+        if (!*more) break;
         if (line.starts_with('#')) {
             if (const Status status = read_comment(at, line, stated_max); !status.ok()) return status.error();
             continue;
         }
         const auto words = words_of(line);
-        if (words.empty()) continue;
+        if (words.empty() && !has_empty_cell(line)) continue;
+        if (has_empty_cell(line)) return at.error("an empty cell: give every lamp a level");
         if (const Status status = read_row(at, words, basis); !status.ok()) return status.error();
     }
     if (basis.rows == 0) return fail(path + ": no rows of levels in it");

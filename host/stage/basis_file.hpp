@@ -16,7 +16,8 @@
 namespace ols {
 
 // Reads the levels and inverts them by least squares (with_least_squares). The basis is named for the file, without folder
-// and ending. Errors name file and line: a word that is no level, a row of another length than `lamps`.
+// and ending. Errors name file and line: a word that is no level, an empty cell, a row of another length than `lamps`, more
+// rows than a board plays slots.
 Result<Basis> read_basis(const std::string& path, int lamps);
 
 // Writes the levels of any basis; `comment`, if any, becomes comment lines. Never leaves a half-written file.

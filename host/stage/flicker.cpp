@@ -15,6 +15,20 @@ double us_of_ticks(uint64_t ticks) {
     return double(ticks) / double(ticks_per_us);
 }
 
+// Amplitude over mean of a component of light that flashes at each slot's start.
+double modulation_of(const Sequence& sequence, const std::vector<double>& light, int harmonic) {
+    std::complex<double> sum = 0;
+    double mean = 0;
+    uint64_t start = 0;
+    const double cycle = double(sequence.cycle_ticks());
+    for (size_t s = 0; s < light.size(); ++s) {
+        sum += std::polar(light[s], -2 * std::numbers::pi * harmonic * double(start) / cycle);
+        mean += light[s];
+        start += sequence.slots[s].period_ticks;
+    }
+    return mean > 0 ? 2 * std::abs(sum) / mean : 0;
+}
+
 LampLight measure_lamp(const Sequence& sequence, size_t lamp) {
     LampLight light;
     int flashes = 0;
@@ -43,20 +57,10 @@ LampLight measure_lamp(const Sequence& sequence, size_t lamp) {
 
 FlickerPeak find_flicker(const Sequence& sequence, const std::vector<double>& light) {
     const double cycle_hz = double(tick_hz) / double(sequence.cycle_ticks());
-    double mean = 0;
-    for (const double l : light) mean += l;
     FlickerPeak peak;
-    if (mean <= 0) return peak;
     const int first = std::max(1, int(std::ceil(photosensitive_min_hz / cycle_hz)));
     for (int harmonic = first; harmonic * cycle_hz <= photosensitive_max_hz; ++harmonic) {
-        std::complex<double> sum = 0;
-        uint64_t start = 0;
-        for (size_t s = 0; s < light.size(); ++s) {
-            const double turn = double(start) / double(sequence.cycle_ticks());
-            sum += std::polar(light[s], -2 * std::numbers::pi * harmonic * turn);
-            start += sequence.slots[s].period_ticks;
-        }
-        const double modulation = 2 * std::abs(sum) / mean;
+        const double modulation = modulation_of(sequence, light, harmonic);
         if (modulation > peak.modulation) peak = {harmonic * cycle_hz, modulation};
     }
     return peak;
@@ -79,6 +83,7 @@ Flicker measure_flicker(const Sequence& sequence) {
         flicker.lamps.push_back(measure_lamp(sequence, lamp));
         std::vector<double> light;
         for (const Slot& slot : sequence.slots) light.push_back(slot.light_ticks(lamp));
+        flicker.lamps.back().cycle_modulation = modulation_of(sequence, light, 1);
         const FlickerPeak peak = find_flicker(sequence, light);
         if (peak.modulation > flicker.worst_lamp.modulation) {
             flicker.worst_lamp = peak;

@@ -20,6 +20,8 @@ struct LampLight {
     double strobe_hz = 0;  // flashes a second, mean
     double longest_dark_us = 0;
     double duty = 0;  // share of time that the lamp is lit
+    double cycle_modulation =
+        0;  // at the cycle's own rate, amplitude over mean: 2 for one flash a cycle, 0 for evenly spread ones
 };
 
 struct Flicker {

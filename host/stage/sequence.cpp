@@ -8,10 +8,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <numbers>
-#include <numeric>
 
+#include "stage/exposure.hpp"
 #include "stage/pattern_slots.hpp"
+#include "stage/slot_order.hpp"
 #include "stage/toml_section.hpp"
 
 namespace ols {
@@ -43,14 +43,6 @@ std::vector<bool> choose_dark_places(int groups, int places, int dark_count) {
     return dark;
 }
 
-int stride_of(int rows) {
-    const double ideal = rows / std::numbers::phi;
-    int best = 1;
-    for (int q = 1; q < rows; ++q)
-        if (std::gcd(q, rows) == 1 && std::abs(q - ideal) < std::abs(best - ideal)) best = q;
-    return best;
-}
-
 // Makes the slots of one sequence; lamps and triggers are the same for all slots of a kind but basis.
 class CycleLayout {
   public:
@@ -59,27 +51,31 @@ class CycleLayout {
         trigger_mask_ = trigger_mask_of(stage);
     }
 
+    int slots() const { return groups() * config_.group_slots; }
+
     std::vector<Slot> lay_out() const {
-        const int places = config_.group_slots - landmarks_a_group;
-        const int groups = basis_.rows / places + 1;
+        const int places = basis_places_a_group(), groups = this->groups();
         const auto dark = choose_dark_places(groups, places, groups * places - basis_.rows);
-        const int stride = stride_of(basis_.rows);
         std::vector<Slot> cycle;
-        int64_t basis_place = 0;
+        std::vector<int> basis_places;
         for (int place = 0; place < groups * places; ++place) {
             if (place % places == 0) {
                 cycle.push_back(tracking());
                 cycle.push_back(matte());
             }
-            if (dark[place])
-                cycle.push_back(unlit(SlotKind::dark, config_.basis_exposure_us));
-            else
-                cycle.push_back(basis_row(int(basis_place++ * stride % basis_.rows)));
+            if (!dark[size_t(place)]) basis_places.push_back(int(cycle.size()));
+            cycle.push_back(unlit(SlotKind::dark, config_.basis_exposure_us));
         }
+        const auto order = spread_rows(basis_, basis_places, int(cycle.size()));
+        for (size_t n = 0; n < order.size(); ++n) cycle[size_t(basis_places[n])] = basis_row(order[n]);
         return cycle;
     }
 
   private:
+    int basis_places_a_group() const { return config_.group_slots - landmarks_a_group; }
+    // As many as hold all rows and one dark slot.
+    int groups() const { return basis_.rows / basis_places_a_group() + 1; }
+
     // A dark slot is exposed as long as a basis slot, so that it shows the black level that these have.
     Slot unlit(SlotKind kind, double exposure_us) const {
         Slot slot;
@@ -155,10 +151,11 @@ void read_patterns(TomlSection& file, SequenceConfig& config) {
 // The cycle of a sequence that is no capture basis.
 Result<Sequence> compile_patterns(const SequenceConfig& config, const StageConfig& stage) {
     Sequence sequence{config, {}, {}};
+    if (config.basis_exposure_us == 0) sequence.config.basis_exposure_us = longest_exposure_us(config.frame_rate_hz);
     sequence.basis.lamps = int(stage.lamps.size());
     sequence.basis.name = config.listed_slots.empty() ? harmonics_name : "listed";
     if (config.listed_slots.empty()) {
-        sequence.slots = harmonic_slots(config, stage, trigger_mask_of(stage));
+        sequence.slots = harmonic_slots(sequence.config, stage, trigger_mask_of(stage));
     } else {
         auto slots = fit_listed_slots(config.listed_slots, stage, trigger_mask_of(stage));
         if (!slots.ok()) return slots.error();
@@ -226,12 +223,15 @@ static Result<Sequence> compile_capture(const SequenceConfig& config, const Stag
     if (const Status status = check_exposures(config); !status.ok()) return status.error();
 
     Sequence sequence{config, std::move(*basis), {}};
-    sequence.slots = CycleLayout(config, stage, sequence.basis).lay_out();
-    if (sequence.slots.size() > OLS_SLOTS_MAX)
+    if (config.basis_exposure_us == 0)
+        sequence.config.basis_exposure_us = derived_exposure_us(sequence.basis, stage, config.frame_rate_hz);
+    const CycleLayout layout(sequence.config, stage, sequence.basis);
+    if (layout.slots() > OLS_SLOTS_MAX)
         return fail(
             fmt::format("the cycle has {} slots and the board plays {}: choose longer groups or a basis of "
                         "fewer rows",
-                        sequence.slots.size(), OLS_SLOTS_MAX));
+                        layout.slots(), OLS_SLOTS_MAX));
+    sequence.slots = layout.lay_out();
     std::vector<SlotKind> kinds;
     for (const Slot& slot : sequence.slots) kinds.push_back(slot.kind);
     if (!has_unique_order(kinds))

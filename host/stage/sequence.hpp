@@ -19,7 +19,8 @@ enum class SlotKind : uint8_t { basis = OLS_BASIS, tracking = OLS_TRACKING, matt
 
 const char* slot_kind_name(SlotKind kind);
 
-// The table [harmonics], for basis = "spherical_harmonics".
+// The table [harmonics], for basis = "spherical_harmonics": its functions one after the other, to be played and watched.
+// What is recorded and inverted is the basis spherical_harmonics:ORDER.
 struct HarmonicsConfig {
     int order = 2;  // nine functions: enough for diffuse light (Ramamoorthi and Hanrahan 2001)
     HarmonicSign sign = HarmonicSign::split;
@@ -55,10 +56,9 @@ struct SequenceConfig {
     std::string basis = "single";
     double frame_rate_hz = 2160;  // of the cameras; the paper's
     int cycles = 1;
-    int group_slots = 18;  // tracking, matte and this many less two places for the basis (Wenger 4)
-    // One lamp fits 412 us of the 463 us between frames. A multiplexed basis lights half the lamps at once and
-    // saturates skin there: 100 us (Wenger 5.3). All lamps together leave 50 us for tracking.
-    double basis_exposure_us = 412;
+    int group_slots = 18;          // tracking, matte and this many less two places for the basis (Wenger 4)
+    double basis_exposure_us = 0;  // 0: as long as a white card stays below saturation (stage/exposure.hpp)
+    // All lamps at once would saturate skin in the 412 us that one lamp, or the matte board, has.
     double tracking_exposure_us = 50;
     double matte_exposure_us = 412;
     std::vector<int> tracking_lamps;    // empty: all on the sphere
@@ -69,7 +69,7 @@ struct SequenceConfig {
 };
 
 struct Sequence {
-    SequenceConfig config;
+    SequenceConfig config;  // with the basis exposure that was decided
     Basis basis;
     std::vector<Slot> slots;  // one cycle
 
@@ -84,9 +84,7 @@ struct Sequence {
 Result<SequenceConfig> read_sequence(const std::string& path);
 
 // Lays out the cycle: groups of tracking, matte and basis places, as many as hold every row of the basis and at least
-// one dark slot. Row p * q mod rows stands at basis place p, where q, coprime to the rows, is nearest to rows / golden
-// ratio: rows that follow each other are far apart in the basis, so that neighbouring lamps do not light in turn and
-// a lamp's on-times do not cluster. Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
+// one dark slot. Rows stand where each lamp's light spreads evenly over the cycle (stage/slot_order.hpp). Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
 // place of its own: no two dark slots have the same distance to their group's tracking slot, so that each of them
 // alone tells where in the cycle it is.
 // Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;

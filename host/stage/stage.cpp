@@ -6,6 +6,7 @@
 
 #include <set>
 
+#include "stage/camera_presets.hpp"
 #include "stage/toml_section.hpp"
 #include "wire.h"
 
@@ -73,8 +74,19 @@ void read_chain(TomlSection chain, StageConfig& stage) {
             return chain.reject("bits", fmt::format("is {}, but a lamp sits on bit {}", stage.chain_bits, bit));
 }
 
+// What a preset knows; the keys beside it may say otherwise.
+void read_preset(TomlSection& camera, CameraConfig& config) {
+    std::map<std::string, CameraPreset> presets;
+    for (const auto& preset : camera_presets()) presets[preset.name] = preset;
+    CameraPreset chosen{"", "", config.bits, config.noise};
+    camera.read_choice("preset", chosen, presets);
+    config.bits = chosen.bits;
+    config.noise = chosen.noise;
+}
+
 CameraConfig read_camera(TomlSection& camera) {
     CameraConfig config;
+    read_preset(camera, config);
     camera.read("source", config.source);
     camera.read("width", config.width, 8, 16384);
     camera.read("height", config.height, 8, 16384);

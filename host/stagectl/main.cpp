@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
     ols::add_play_verb(app, exit_code);
     ols::add_status_verb(app, exit_code);
     ols::add_sequence_verb(app, exit_code);
+    ols::add_basis_verb(app, exit_code);
     ols::add_grey_verb(app, exit_code);
     ols::add_calibrate_verb(app, exit_code);
     ols::add_ingest_verb(app, exit_code);

@@ -6,6 +6,7 @@
 
 #include "capture/board_log.hpp"
 #include "capture/recorder.hpp"
+#include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -15,7 +16,7 @@ namespace {
 
 struct Options {
     LinkOptions links;
-    std::string sequence;
+    SequenceOptions sequence;
     int cycles = -1;
     bool json = false;
 };
@@ -39,8 +40,8 @@ struct Account {
     }
 };
 
-Result<Sequence> open_sequence(const Options& options, const StageConfig& stage) {
-    auto config = read_sequence(options.sequence);
+Result<Sequence> compile(const Options& options, const StageConfig& stage) {
+    auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
     if (options.cycles >= 0) config->cycles = options.cycles;
     return compile_sequence(*config, stage);
@@ -57,7 +58,7 @@ void follow(Board& board, bool json, Account& account) {
 Result<int> run(const Options& options) {
     const auto stage = open_stage(options.links);
     if (!stage.ok()) return stage.error();
-    const auto sequence = open_sequence(options, *stage);
+    const auto sequence = compile(options, *stage);
     if (!sequence.ok()) return sequence.error();
     auto board = open_board(options.links, *stage);
     if (!board.ok()) return board.error();
@@ -86,7 +87,7 @@ void add_play_verb(CLI::App& app, int& exit_code) {
         "Ctrl-C turns the light off. Exit codes: 0 played, or stopped by you; 1 an error or a fault; 2 triggers were "
         "not seen.\n"
         "Flashing light can trigger seizures: see `stagectl sequence`.");
-    verb->add_option("sequence", options->sequence, "sequence.toml")->required();
+    options->sequence.add_to(*verb, "sequence");
     options->links.add_to(*verb, false);
     verb->add_option("--cycles", options->cycles,
                      "how often to play the cycle, 0 until stopped; otherwise as the sequence says")

@@ -4,7 +4,9 @@
 
 #include <fstream>
 
+#include "capture/basis_record.hpp"
 #include "capture/take.hpp"
+#include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -14,9 +16,11 @@ namespace {
 
 struct Options {
     LinkOptions links;
-    std::string sequence, output, calibration, frames;
+    SequenceOptions sequence;
+    std::string output, calibration, frames;
     TakeInfo slate;
     int cycles = 0;
+    std::string fill = "none", estimate = "none";
     bool nominal = false, overwrite = false, single_float = false, json = false;
 };
 
@@ -36,6 +40,7 @@ TakeInfo describe_take(const Options& options, const Sequence& sequence, const S
     info.basis = sequence.basis.name;
     info.value_unit = "reflectance";
     info.lights = image_lights(sequence.basis, stage.lamps);
+    info.extra["basis"] = basis_record(sequence.basis);
     info.sample_type = options.single_float ? SampleType::single_float : SampleType::half_float;
     return info;
 }
@@ -56,11 +61,13 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
             {"saturated_share", report.saturated_share},
+            {"estimated_share", report.estimated_share},
+            {"unsolved_share", report.unsolved_share},
             {"seconds",
              {{"total", report.seconds_total}, {"develop", report.seconds_develop}, {"write", report.seconds_write}}}};
 }
 
-void print_report(const TakeReport& report, const Options& options) {
+void print_report(const TakeReport& report, bool is_estimate, const Options& options) {
     const RecordReport& record = report.record;
     if (!options.json)
         fmt::print("{}: {} targets written, {} missing; {} of {} slots missing; {:.1f} s\n", options.output,
@@ -71,10 +78,19 @@ void print_report(const TakeReport& report, const Options& options) {
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);
     if (report.saturated_share > 0)
+        fmt::print(
+            stderr,
+            "stagectl: {:.2g} % of the pixels have saturated samples, which are left out: shorten the exposure\n",
+            report.saturated_share * 100);
+    if (report.unsolved_share > 0)
         fmt::print(stderr,
-                   "stagectl: {:.2g} % of the pixels rest on a saturated sample and are masked: shorten the exposure\n",
-                   report.saturated_share * 100);
+                   "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: --estimate "
+                   "smooth or nonnegative estimates them\n",
+                   report.unsolved_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
+    if (is_estimate)
+        fmt::print(stderr,
+                   "stagectl: the basis has fewer independent rows than lamps: what was written is an estimate\n");
     if (record.slots_missing > 0)
         fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
                    options.output);
@@ -96,8 +112,16 @@ void add_to_account(std::ofstream& account, const Frame& frame) {
             << '\n';
 }
 
+TakeMasks masks_of(const Options& options) {
+    TakeMasks masks;
+    masks.fill_from_neighbours = options.fill == "neighbours";
+    if (options.estimate == "smooth") masks.estimate = Estimate::smooth;
+    if (options.estimate == "nonnegative") masks.estimate = Estimate::nonnegative;
+    return masks;
+}
+
 Result<int> run(const Options& options) {
-    auto config = read_sequence(options.sequence);
+    auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
     if (options.cycles > 0) config->cycles = options.cycles;
     const auto stage = open_stage(options.links);
@@ -106,7 +130,7 @@ Result<int> run(const Options& options) {
     if (!sequence.ok()) return sequence.error();
     if (!sequence->is_capture() || sequence->config.playback.start == StartSource::photo)
         return fail(
-            options.sequence +
+            options.sequence.path +
             ": a take is recorded from a capture basis, whose triggers come at an even pace; play listed slots, "
             "harmonics and start = \"photo\" with `stagectl play`");
     const auto calibration = open_calibration(options, *stage);
@@ -119,11 +143,11 @@ Result<int> run(const Options& options) {
     if (!archive.ok()) return archive.error();
 
     const auto report = run_take(
-        *session->board, *session->camera, *sequence, *stage, *calibration, *archive, stop_on_signal(),
-        [&](const Frame& frame) { add_to_account(*account, frame); },
+        *session->board, *session->camera, *sequence, *stage, *calibration, masks_of(options), *archive,
+        stop_on_signal(), [&](const Frame& frame) { add_to_account(*account, frame); },
         [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
     if (!report.ok()) return report.error();
-    print_report(*report, options);
+    print_report(*report, sequence->basis.is_estimate, options);
     if (options.json) fmt::print("{}\n", to_json(*report, options).dump(1));
     if (!report->write_error.empty()) return 1;
     return report->targets_missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
@@ -137,17 +161,29 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Example: stagectl run --sequence examples/sequence_s159.toml --stage examples/stage.toml \\\n"
         "           --board socket:run/board.sock --camera ring:run/cam0.ring --calibration cal -o take.rfa\n"
+        "         stagectl run --basis triangle --board usb: --camera ring:run/cam0.ring --calibration cal -o "
+        "take.rfa\n"
         "Ctrl-C turns the light off and finishes the archive with what was recorded; a second one ends at once.\n"
         "Exit codes: 0 every slot was recorded; 1 an error; 2 the archive is finished, and slots or targets are "
         "missing.\nFlashing light can trigger seizures: see `stagectl sequence`.");
-    verb->add_option("--sequence", options->sequence, "sequence.toml")->required();
+    options->sequence.add_to(*verb, "--sequence");
+    verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
+        ->check(CLI::Range(1, 1'000'000));
     options->links.add_to(*verb, true);
     verb->add_option("--calibration", options->calibration, "folder of `stagectl calibrate`");
     verb->add_flag("--nominal", options->nominal, "no calibration: black level and gain as the stage states them");
-    verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
-        ->check(CLI::Range(1, 1'000'000));
     verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();
     verb->add_option("--frames", options->frames, "file for a JSON line a frame: its id and time, its cycle and slot");
+    verb->add_option("--fill", options->fill,
+                     "lost slots of the basis: none, or neighbours: the same slot of the cycles before and after; a "
+                     "subject that moves smears")
+        ->check(CLI::IsMember({"none", "neighbours"}));
+    verb->add_option(
+            "--estimate", options->estimate,
+            "pixels whose lost and saturated samples the others do not determine: none: 0 and masked; smooth: "
+            "neighbouring lamps give similar values; nonnegative: and no lamp less than nothing, no saturated "
+            "sample less than white; some milliseconds a pixel. Estimates are masked, with a bound of their bias")
+        ->check(CLI::IsMember({"none", "smooth", "nonnegative"}));
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");

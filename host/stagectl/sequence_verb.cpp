@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stage/flicker.hpp"
+#include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -14,7 +15,8 @@ namespace ols {
 namespace {
 
 struct Options {
-    std::string sequence, stage;
+    SequenceOptions sequence;
+    std::string stage;
     bool json = false, slots = false;
 };
 
@@ -126,7 +128,7 @@ void print_summary(const Summary& summary, const Sequence& sequence) {
 }
 
 Result<int> run(const Options& options) {
-    const auto config = read_sequence(options.sequence);
+    const auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
     const auto stage = options.stage.empty() ? Result<StageConfig>(default_stage()) : read_stage(options.stage);
     if (!stage.ok()) return stage.error();
@@ -147,8 +149,10 @@ Result<int> run(const Options& options) {
 void add_sequence_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<Options>();
     CLI::App* verb = app.add_subcommand("sequence", "compile a sequence and say what it does: length, light, flicker");
-    verb->footer("Example: stagectl sequence examples/sequence_single.toml --stage examples/stage.toml --slots");
-    verb->add_option("sequence", options->sequence, "sequence.toml")->required();
+    verb->footer(
+        "Example: stagectl sequence examples/sequence_single.toml --stage examples/stage.toml --slots\n"
+        "         stagectl sequence --basis paley163");
+    options->sequence.add_to(*verb, "sequence");
     verb->add_option("--stage", options->stage, "stage.toml; without it, the default stage");
     verb->add_flag("--slots", options->slots, "list every slot");
     verb->add_flag("--json", options->json, "print as JSON, with slots and lamps");

@@ -46,7 +46,11 @@ def test_the_calibrated_card_shows_lamberts_cosine_under_every_lamp(card_stage, 
         # largest of 156, and twice that at half the exposure.
         limit = {"single": 0.01, "s159": 0.025, "hadamard156": 0.05}[basis]
         errors = means - CARD * cosine
-        assert np.abs(errors).max() < limit, basis
+        limits = np.full(len(errors), limit)
+        if basis == "hadamard156":
+            # Lamp 0 rests on the row of all lamps with weight 1 (noise gain 1): 31 counts of noise at 3300, five times that.
+            limits[0] = 5 * 31 / (2.52 * exposure_us) / 8
+        assert (np.abs(errors) < limits).all(), basis
         assert abs(errors.mean()) < limit / 10, basis
 
 

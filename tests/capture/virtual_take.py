@@ -96,5 +96,13 @@ def read_lamps(archive, index, channel="Y"):
     raise AssertionError("no part of lamps")
 
 
+def read_plane(archive, index, name):
+    """[y, x] of a target's part of one channel: mask, variance, noise_gain."""
+    for part in OpenEXR.File(str(target_file(archive, index)), separate_channels=True).parts:
+        if part.header["name"] == name:
+            return part.channels["Y"].pixels
+    raise AssertionError(f"no part {name}")
+
+
 def verify(archive):
     return subprocess.run([BIN / "rf", "verify", archive], capture_output=True, text=True)

@@ -41,7 +41,7 @@ double mean_noise_variance(const Basis& basis) {
 }  // namespace
 
 class EveryBasis : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(, EveryBasis, testing::Values("single", "s159", "hadamard156", "paley163"));
+INSTANTIATE_TEST_SUITE_P(, EveryBasis, testing::Values("single", "planes156", "s159", "hadamard156", "paley163"));
 
 TEST_P(EveryBasis, weights_times_rows_are_the_identity_in_exact_integers) {
     const Basis basis = *find_basis(GetParam());
@@ -145,6 +145,8 @@ TEST(Basis, the_others_have_the_condition_and_noise_of_their_matrices) {
         EXPECT_FALSE(basis.is_estimate) << name;
     };
     expect("s155", 155, 155, 12.5, 0.0255);
+    // N' N = 25 I + 6 J: singular values 5, and 31 once; the mean of the inverse squares is (155 / 25 + 1 / 961) / 156.
+    expect("planes156", 156, 156, 31 / 5.0, (155 / 25.0 + 1 / 961.0) / 156);
     expect("paley163", 163, 156, 12.5, 0.0242);
     expect("triangle300", 300, 156, 11.1, 0.58);
     expect("triangle", 155, 155, matrix_figures(*find_basis("triangle")).condition, 1 / 9.0);

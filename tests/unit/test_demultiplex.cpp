@@ -60,7 +60,7 @@ class Demultiplex : public testing::TestWithParam<std::string> {
   protected:
     const Basis basis = *find_basis(GetParam());
 };
-INSTANTIATE_TEST_SUITE_P(, Demultiplex, testing::Values("single", "s159", "hadamard156", "paley163"));
+INSTANTIATE_TEST_SUITE_P(, Demultiplex, testing::Values("single", "planes156", "s159", "hadamard156", "paley163"));
 
 TEST_P(Demultiplex, signed_integer_lamps_come_back_to_a_rounding) {
     const Counts lamps = random_lamps(basis.lamps, 777, -500, 4000);

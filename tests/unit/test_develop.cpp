@@ -159,17 +159,6 @@ TEST(Develop, a_slot_lost_from_the_single_basis_is_one_missing_lamp) {
     for (const uint32_t mask : target->mask) EXPECT_EQ(mask, uint32_t(mask_missing));
 }
 
-TEST(Develop, a_slot_lost_from_a_multiplexed_basis_is_an_error_that_names_it) {
-    for (const char* basis : {"s159", "hadamard156"}) {
-        Cycle cycle = random_cycle<uint16_t>(basis, Cfa::rggb);
-        const size_t slot = slot_of_row(cycle.sequence, 42);
-        cycle.frames.slots[slot] = nullptr;
-        const auto target = develop_cycle(cycle.frames, cycle.sequence, cycle.calibration, NoiseModel{});
-        ASSERT_FALSE(target.ok());
-        EXPECT_NE(target.error().message.find(std::to_string(slot)), std::string::npos);
-    }
-}
-
 TEST(Develop, a_slot_that_is_no_basis_slot_may_be_missing) {
     Cycle cycle = random_cycle<uint16_t>("s159", Cfa::rggb);
     for (size_t s = 0; s < cycle.sequence.slots.size(); ++s)

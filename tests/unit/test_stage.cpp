@@ -94,3 +94,11 @@ TEST_F(StageFile, a_mistake_is_named_with_file_line_and_key) {
     expect("[[camera]]\nlook_at_m = [0, 0]\n", "2", "three numbers");
     EXPECT_NE(read_stage("/nonexistent.toml").error().message.find("/nonexistent.toml"), std::string::npos);
 }
+
+TEST_F(StageFile, a_preset_gives_bits_and_noise_and_the_keys_beside_it_overrule_it) {
+    const auto stage = read_stage(write("stage.toml", "[[camera]]\npreset = \"canon_d30\"\nnoise_shot = 0.5\n"));
+    ASSERT_TRUE(stage.ok()) << stage.error().message;
+    EXPECT_NEAR(stage->cameras[0].noise.read_counts, 18 * 4095 / 50000.0, 1e-12);
+    EXPECT_EQ(stage->cameras[0].noise.shot, 0.5);
+    EXPECT_NE(error_of("[[camera]]\npreset = \"d30\"\n").find("stage.toml:2: camera.preset"), std::string::npos);
+}

@@ -57,11 +57,20 @@ std::string target_line(const json& target) {
     return line;
 }
 
+std::string basis_line(const json& basis) {
+    const bool is_estimate = basis.value("is_estimate", false);
+    return fmt::format("{} rows over {} lamps, rank {}, condition {:.4g}{}", basis.value("rows", 0),
+                       basis.value("lamps", 0), basis.value("rank", 0), basis.value("condition", 0.0),
+                       is_estimate ? "; fewer independent rows than lamps: the values are an ESTIMATE" : "");
+}
+
 void print_report(const json& report, const TakeInfo& info) {
     fmt::print("{}: {}\n", report["path"].get<std::string>(),
                report["finished"] ? "finished" : "NOT FINISHED: the recording was interrupted, see rf verify");
     fmt::print("  lamps      {}{}\n", info.lights.size(),
                info.basis.empty() ? ", photographed one by one" : ", basis " + info.basis);
+    if (const json& basis = info.extra.value("basis", json()); basis.is_object())
+        fmt::print("  basis      {}\n", basis_line(basis));
     fmt::print("  values     {}, {} float, scene-linear, color {}\n",
                info.value_unit == "reflectance" ? "r = pi L / E (a white surface facing the lamp is 1)"
                                                 : "pixel values (full scale is 1)",

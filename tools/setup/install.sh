@@ -58,7 +58,7 @@ install_venv() {
     [ -e "$done" ] && [ -x "$root/.venv/bin/python" ] && return
     echo "setup: making the Python environment .venv"
     python3 -m venv "$root/.venv"
-    "$root/.venv/bin/pip" install -q --disable-pip-version-check -r "$here/requirements.txt"
+    "$root/.venv/bin/python" -m pip install -q --disable-pip-version-check -r "$here/requirements.txt"
     touch "$done"
 }
 

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+// Loading of bands; a row of one frame, as nearly all are, goes straight from counts to counts.
+#include "capture/row_band.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "capture/align.hpp"
+#include "reflectance/masked_sample.hpp"
+
+namespace ols {
+
+namespace {
+
+template <typename Sum>
+using SampleOf = std::conditional_t<std::is_same_v<Sum, int32_t>, uint16_t, float>;
+
+template <typename Sum>
+const SampleOf<Sum>* samples_of(const Frame& frame, const Band& band, size_t y) {
+    const std::byte* row = frame.samples.data() + (band.first_row + y) * frame.pitch_bytes;
+    return reinterpret_cast<const SampleOf<Sum>*>(row) + band.channel;
+}
+
+// The black level of each sample, whole for integer sums.
+template <typename Sum>
+std::vector<Sum> prepare_black(RowBand<Sum>& loaded, const Band& band, const Image& black, float white) {
+    std::vector<Sum> level(band.samples());
+    loaded.black_rest.resize(band.samples());
+    loaded.white.resize(band.samples());
+    for (size_t p = 0; p < band.samples(); ++p) {
+        const float counts = black.data[(band.first_pixel() + p) * size_t(band.channels) + size_t(band.channel)];
+        level[p] = std::is_same_v<Sum, int32_t> ? Sum(std::round(counts)) : Sum(counts);
+        loaded.black_rest[p] = counts - float(level[p]);
+        loaded.white[p] = white - float(level[p]);
+    }
+    return level;
+}
+
+template <typename Sum>
+void load_frame(const Frame& frame, const Band& band, const std::vector<Sum>& black, bool clipped_stay, Sum* out,
+                uint8_t* masked) {
+    for (size_t y = 0; y < band.rows; ++y) {
+        const auto* samples = samples_of<Sum>(frame, band, y);
+        const size_t first = y * band.width;
+        for (size_t x = 0; x < band.width; ++x) {
+            const auto counts = samples[x * size_t(band.channels)];
+            const bool saturated = float(counts) >= frame.white, finite = std::isfinite(float(counts));
+            const Sum above_black = Sum(counts) - black[first + x];
+            out[first + x] = finite && (!saturated || clipped_stay) ? above_black : masked_sample<Sum>;
+            if (saturated) masked[first + x] |= mask_saturated;
+            if (!finite && !saturated) masked[first + x] |= mask_missing;
+        }
+    }
+}
+
+// The mean of several frames, of the samples that none of them has masked.
+template <typename Sum>
+void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Band& band, const std::vector<Sum>& black,
+               bool clipped_stay, std::vector<Sum>& out, std::vector<uint8_t>& masked) {
+    std::vector<float> sums(band.samples()), counts(band.samples());
+    for (const auto& frame : frames) {
+        load_frame(*frame, band, black, clipped_stay, out.data(), masked.data());
+        for (size_t p = 0; p < out.size(); ++p) {
+            if (out[p] == masked_sample<Sum> || std::isnan(float(out[p]))) continue;
+            sums[p] += float(out[p]);
+            counts[p] += 1;
+        }
+    }
+    for (size_t p = 0; p < out.size(); ++p) sums[p] = counts[p] > 0 ? sums[p] / counts[p] : 0;
+    if constexpr (std::is_same_v<Sum, int32_t>)
+        align_samples(sums, out);
+    else
+        out = sums;
+    for (size_t p = 0; p < out.size(); ++p)
+        if (counts[p] == 0) out[p] = masked_sample<Sum>;
+}
+
+}  // namespace
+
+template <typename Sum>
+std::vector<Sum*> RowBand<Sum>::pointers() {
+    std::vector<Sum*> all;
+    for (auto& row : rows) all.push_back(row.data());
+    return all;
+}
+
+template <typename Sum>
+RowBand<Sum> load_row_band(const RowFrames& frames, const Band& band, const Image& black, bool clipped_stay) {
+    RowBand<Sum> loaded;
+    loaded.rows.assign(frames.size(), std::vector<Sum>(band.samples()));
+    loaded.masked.assign(band.samples(), 0);
+    const auto shown = std::find_if(frames.begin(), frames.end(), [](const auto& some) { return !some.empty(); });
+    const auto level = prepare_black(loaded, band, black, shown->front()->white);
+    for (size_t row = 0; row < frames.size(); ++row) {
+        if (frames[row].empty()) {
+            std::fill(loaded.rows[row].begin(), loaded.rows[row].end(), masked_sample<Sum>);
+            for (uint8_t& mark : loaded.masked) mark |= mask_missing;
+        } else if (frames[row].size() == 1) {
+            load_frame(*frames[row][0], band, level, clipped_stay, loaded.rows[row].data(), loaded.masked.data());
+        } else {
+            load_mean(frames[row], band, level, clipped_stay, loaded.rows[row], loaded.masked);
+        }
+    }
+    return loaded;
+}
+
+template struct RowBand<int32_t>;
+template struct RowBand<float>;
+template RowBand<int32_t> load_row_band(const RowFrames&, const Band&, const Image&, bool);
+template RowBand<float> load_row_band(const RowFrames&, const Band&, const Image&, bool);
+
+}  // namespace ols

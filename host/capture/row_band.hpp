@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Row band: one colour of a band of pixel rows, calibrated and aligned, for every row of the basis.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "archive/archive.hpp"
+#include "image/frame.hpp"
+#include "stage/calibration.hpp"
+
+namespace ols {
+
+// The frames that show each row of the basis: as many as serve it, none where it was lost.
+using RowFrames = std::vector<std::vector<std::shared_ptr<const Frame>>>;
+
+// Which samples of the frames: pixel rows first_row ... of one channel.
+struct Band {
+    size_t first_row = 0, rows = 0, width = 0;
+    int channel = 0, channels = 1;
+
+    size_t samples() const { return rows * width; }
+    size_t first_pixel() const { return first_row * width; }
+};
+
+// Sum: int32_t for frames of counts, float for frames of floats.
+template <typename Sum>
+struct RowBand {
+    std::vector<std::vector<Sum>>
+        rows;  // [basis row][sample], counts above black; masked_sample<Sum> where there is none
+    // Of each sample: MaskBit of what was left out of it, in any row (mask_saturated, mask_missing); 0 where all is there.
+    std::vector<uint8_t> masked;
+    std::vector<float> black_rest;  // of each sample: what is left of the black level in every row, |rest| <= 0.5
+    std::vector<float> white;       // of each sample: the count above black at which it saturates
+
+    std::vector<Sum*> pointers();
+};
+
+// The mean of each row's frames, rounded to whole counts for int32_t, without samples at or above white or not finite; a
+// sample that no frame has is masked. With `clipped_stay` saturated samples count like others, marked all the same.
+template <typename Sum>
+RowBand<Sum> load_row_band(const RowFrames& frames, const Band& band, const Image& black, bool clipped_stay);
+
+}  // namespace ols

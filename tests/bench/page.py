@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""docs/accuracy.md: made of the registry of knobs and of what `make bench` measured, by nothing else."""
+import pareto
+
+HEAD = """# What accuracy costs
+
+Every approximation has a knob. For each setting: its error against truth, its time beside a named peer's in the same run, its memory. This
+page, its table and its plot are written by `make bench`, which also leaves the figures in `out/bench/<subject>.json`
+(`make bench SUBJECT=inversion` measures one subject only).
+
+- **error** is against a truth that the measured code did not make; each subject says which. 0 is exact.
+- **time** is the median over {rounds} rounds. All settings of a knob run in every round, so that a disturbance of the machine meets all of them.
+  With one thread it is processor time, with more the clock's.
+- **speed** is the peer's time over the setting's own, the median over the rounds: above 1 is faster than the peer.
+- **memory** is what a run makes resident at its peak beyond its inputs and outputs.
+- **Bold** is the default; a ● marks the Pareto front: no other setting of the knob is as accurate and faster, or more accurate and no slower (times
+  within 3 % count as equal).
+
+Measured on {machine}.
+
+![Error over time for each knob](images/accuracy.png)
+
+*Each panel is a knob: error over time, both logarithmic, exact results on the bottom line. The line is the Pareto front, the circle the
+default, the square the peer.*
+"""
+COLUMNS = "| knob | setting | | error | time, ms | speed | threads | memory, MB |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n"
+
+
+def significant(value, digits):
+    """A number without exponent as long as it has at most six digits before the point: 0.0251, 12.3, 173, 1.2e-07."""
+    if value == 0:
+        return "0"
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text
+
+
+def rows_of(knob, rows):
+    return [row for row in rows if row["knob"] == knob["knob"]]
+
+
+def table_line(row, is_first, on_front):
+    name = f"**{row['setting']}**" if row["default"] else row["setting"]
+    error = "not finite" if row["error"] is None else "0" if row["error"] == 0 else f"{significant(row['error'], 2)} {row['error_unit']}"
+    memory = "not known" if row["bytes"] is None else significant(row["bytes"] / 1e6, 2)
+    cells = [row["knob"] if is_first else "", name, "●" if on_front else "", error, significant(row["ms_median"], 3),
+             significant(row["ratio_to_peer"], 3), str(row["threads"]), memory]
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def default_on_front(knob, rows):
+    return any(row["default"] for row in pareto.front(rows_of(knob, rows)))
+
+
+def knob_sentence(knob, rows):
+    """Where the knob is set, its peer, and how the default stands."""
+    text = f"- `{knob['knob']}` is set by {knob['set_by']}; its peer is {knob['peer']}. The default, {knob['default']}, is "
+    if default_on_front(knob, rows):
+        return text + "on the Pareto front.\n"
+    return text + f"not on the Pareto front: {knob['why_off_front']}\n"
+
+
+def unexplained(subject, knobs, rows):
+    """Knobs whose default is off the front, without a reason in the registry."""
+    return [f"{subject['subject']}, {knob['knob']}: the default '{knob['default']}' is not on the Pareto front, and why_off_front is empty"
+            for knob in knobs if not default_on_front(knob, rows) and not knob["why_off_front"]]
+
+
+def section(subject, knobs, rows):
+    text = f"\n## {subject['subject'].capitalize()}\n\n{subject['truth']}\n\n{subject['advice']}\n\n" + COLUMNS
+    for knob in knobs:
+        own = rows_of(knob, rows)
+        on_front = [row["setting"] for row in pareto.front(own)]
+        text += "".join(table_line(row, i == 0, row["setting"] in on_front) for i, row in enumerate(own))
+    return text + "\n" + "".join(knob_sentence(knob, rows) for knob in knobs)
+
+
+def page(registry, results, machine):
+    """registry: [(subject, knobs)] as programs list them; results: rows by subject name."""
+    counts = sorted({row["rounds"] for rows in results.values() for row in rows})
+    rounds = " or ".join(map(str, counts))
+    return HEAD.format(machine=machine, rounds=rounds) + "".join(section(subject, knobs, results[subject["subject"]]) for subject, knobs in registry)
+
+
+def missing(registry, text):
+    """Knobs and defaults of the registry that the page does not name."""
+    problems = []
+    for subject, knobs in registry:
+        part = text.partition(f"\n## {subject['subject'].capitalize()}\n")[2].partition("\n## ")[0]
+        for knob in knobs:
+            if f"\n| {knob['knob']} | " not in part:
+                problems.append(f"docs/accuracy.md does not have the knob '{knob['knob']}' of {subject['subject']}: run `make bench`")
+            elif not knob["differs_by_machine"] and f" **{knob['default']}** |" not in part:
+                problems.append(f"docs/accuracy.md has another default than '{knob['default']}' for {knob['knob']}: run `make bench`")
+    return problems

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""The plot of docs/accuracy.md: a panel for each knob."""
+import math
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402
+from matplotlib.ticker import LogLocator, NullFormatter  # noqa: E402
+
+import page  # noqa: E402
+import pareto  # noqa: E402
+
+COLUMNS = 2
+NEAR_X, NEAR_Y = 26, 12  # pixels
+BLUE, GREY, RED = "#1f5fa8", "#666666", "#c0392b"
+
+
+def floor_of(rows):
+    """The bottom line: where exact results are drawn, a decade below the least error; else a little below it."""
+    errors = [row["error"] for row in rows if row["error"]]
+    if not errors:
+        return 1.0
+    return 10 ** (math.floor(math.log10(min(errors))) - 1) if len(errors) < len(rows) else min(errors) / 2
+
+
+def clusters(pixels):
+    """Numbers of points too near each other for a label each, the leftmost point first."""
+    found = []
+    for number in sorted(pixels, key=lambda number: pixels[number][0]):
+        x, y = pixels[number]
+        for cluster in found:
+            if any(abs(x - pixels[other][0]) < NEAR_X and abs(y - pixels[other][1]) < NEAR_Y for other in cluster):
+                cluster.append(number)
+                break
+        else:
+            found.append([number])
+    return found
+
+
+def draw_panel(axes, title, rows):
+    finite = [row for row in rows if row["error"] is not None]
+    floor, front = floor_of(finite), pareto.front(finite)
+    height = {row["setting"]: row["error"] or floor for row in finite}
+    axes.step([row["ms_median"] for row in front], [height[row["setting"]] for row in front], where="post", color=BLUE, linewidth=1.2, zorder=1)
+    for number, row in enumerate(rows, 1):
+        label = f"{number}  {row['setting']}" + (" (not finite)" if row["error"] is None else "")
+        if row["error"] is None:
+            axes.plot([], [], " ", label=label)
+            continue
+        place = row["ms_median"], height[row["setting"]]
+        axes.plot(*place, "s" if row["setting"] == row["peer"] else "o", markersize=6, color=BLUE if row in front else GREY, label=label, zorder=2)
+        if row["default"]:
+            axes.plot(*place, "o", markersize=15, markerfacecolor="none", markeredgecolor=RED, markeredgewidth=1.5, zorder=3)
+    frame_panel(axes, title, finite, floor)
+    places = {number: (row["ms_median"], height[row["setting"]]) for number, row in enumerate(rows, 1) if row["error"] is not None}
+    for numbers in clusters({number: axes.transData.transform(place) for number, place in places.items()}):
+        # The front's line comes from above and leaves to the right.
+        axes.annotate(", ".join(map(str, numbers)), places[numbers[0]], xytext=(-8, 7), textcoords="offset points", ha="right", fontsize=8)
+
+
+def frame_panel(axes, title, rows, floor):
+    axes.set_title(title, fontsize=10, loc="left")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    times = [row["ms_median"] for row in rows]
+    axes.set_xlim(min(times) / 1.8, max(times) * 1.8)
+    highest = max([row["error"] for row in rows] + [10 * floor])
+    axes.set_ylim(floor / 2, highest * 4)
+    axes.set_xlabel("time, ms", fontsize=8)
+    axes.set_ylabel(f"error, {rows[0]['error_unit']}", fontsize=8)
+    axes.tick_params(labelsize=8)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.grid(alpha=0.25)
+    if any(row["error"] == 0 for row in rows):
+        ticks = [tick for tick in axes.get_yticks() if floor < tick <= highest * 4]
+        axes.set_yticks([floor] + ticks[:: max(1, len(ticks) // 5)])
+        axes.yaxis.set_major_formatter(lambda value, _: "exact" if value == floor else f"$10^{{{round(math.log10(value))}}}$")
+        axes.set_ylim(floor / 2, highest * 4)
+    axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.01, 1.02), handlelength=1, frameon=False, borderaxespad=0)
+
+
+def draw(registry, results, path):
+    panels = [(f"{subject['subject']}: {knob['knob']}", page.rows_of(knob, results[subject["subject"]])) for subject, knobs in registry for knob in knobs]
+    lines = math.ceil(len(panels) / COLUMNS)
+    figure, grid = pyplot.subplots(lines, COLUMNS, figsize=(13, 3.1 * lines), squeeze=False, layout="constrained")
+    for axes, panel in zip(grid.flat, panels):
+        draw_panel(axes, *panel)
+    for axes in list(grid.flat)[len(panels):]:
+        axes.set_visible(False)
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    pyplot.close(figure)
