@@ -5,19 +5,20 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 namespace ols {
 
 namespace {
 
-// A coordinate's place among samples of one row or column, edges held.
+// A coordinate's place among samples of one row or column, edges held; what is no number goes to the first.
 struct Place {
     int at;
     float fraction;
 };
 
 Place place_of(float coordinate, int size) {
-    const float held = std::clamp(coordinate, 0.0f, float(size - 1));
+    const float held = coordinate > 0 ? std::min(coordinate, float(size - 1)) : 0.0f;
     const int at = std::min(int(held), std::max(size - 2, 0));
     return {at, held - float(at)};
 }
@@ -59,14 +60,14 @@ float cubic(const Image& image, float x, float y) {
 
 FlowField resized(const FlowField& flow, int width, int height) {
     FlowField out(width, height);
-    const float sx = float(flow.width) / float(width), sy = float(flow.height) / float(height);
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            const float fx = (float(x) + 0.5f) * sx - 0.5f, fy = (float(y) + 0.5f) * sy - 0.5f;
-            const size_t at = size_t(y) * size_t(width) + size_t(x);
-            out.u[at] = bilinear(flow.u, flow.width, flow.height, fx, fy) / sx;
-            out.v[at] = bilinear(flow.v, flow.width, flow.height, fx, fy) / sy;
-        }
+    const auto resize = [&](const std::vector<float>& from, std::vector<float>& to, double scale) {
+        const cv::Mat source(flow.height, flow.width, CV_32F, const_cast<float*>(from.data()));
+        cv::Mat target(height, width, CV_32F, to.data());
+        cv::resize(source, target, target.size(), 0, 0, cv::INTER_LINEAR);
+        if (scale != 1) target *= scale;
+    };
+    resize(flow.u, out.u, double(width) / flow.width);
+    resize(flow.v, out.v, double(height) / flow.height);
     return out;
 }
 

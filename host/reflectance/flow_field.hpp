@@ -19,6 +19,13 @@ struct FlowField {
     size_t size() const { return u.size(); }
 };
 
+// Two images of one channel and the same size, and where they show the subject: 1 where a pixel is seen, 0 where it is
+// saturated, lost or not a number; empty when all of it is seen. What is not seen is finite all the same.
+struct FlowPair {
+    Image from, to;
+    Image from_seen, to_seen;
+};
+
 // The flow at half or double resolution and the like: vectors scale with the image. Bilinear, edges held.
 FlowField resized(const FlowField& flow, int width, int height);
 

@@ -100,6 +100,32 @@ TEST(MergedSamples, shade_a_quarter_of_the_points_and_keep_the_picture) {
     EXPECT_LT(relative_rms(merged.image, truth.image), 0.25 * relative_rms(one, truth.image));
 }
 
+// Pores and creases finer than a pixel: the mean of their light, not the light of their mean.
+TEST(MergedSamples, of_fine_relief_give_its_mean_light) {
+    Scene scene;
+    Material skin = matte(0.5f);
+    skin.type = MaterialType::skin;
+    add_quad(scene, {}, {0, 0, 1}, {0, 1, 0}, 0.4, skin);
+    const StageConfig stage = small_stage({normalized(Vec3{0.6, 0.5, 0.6})}, 64, 48);
+    scene.samples = 1;
+    const Image one = render(scene, stage).image;
+    scene.samples = 16;
+    const Image truth = render(scene, stage).image;
+    scene.merges_samples = true;
+    EXPECT_LT(relative_rms(render(scene, stage).image, truth), 0.05 * relative_rms(one, truth));
+}
+
+// A ball whose pixels are so wide that the mean of a pixel's points lies under the surface.
+TEST(MergedSamples, of_a_bulge_do_not_lie_in_its_own_shadow) {
+    Scene scene;
+    add_sphere(scene, {}, 0.05, matte(0.6f));
+    scene.objects[0].is_convex = false;
+    const StageConfig stage = small_stage({{0, 0, 1}}, 64, 48);
+    const Image truth = render(scene, stage).image;
+    scene.merges_samples = true;
+    EXPECT_LT(relative_rms(render(scene, stage).image, truth), 0.01);
+}
+
 TEST(MergedSamples, do_not_mix_what_stands_behind_with_what_stands_before) {
     // A card's border runs through the pixels: half card, half wall in shadow-free light.
     Scene scene;

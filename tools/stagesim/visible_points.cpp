@@ -56,13 +56,18 @@ bool merge(Point& a, const Point& b, float reach_m) {
     return true;
 }
 
-Point mean(Point sum) {
+// The mean of what was summed, back on the surface: the mean of points of a bulge lies under it, in its own shadow.
+Point mean(Point sum, const Geometry& geometry, Float3 eye, float reach_m) {
     if (sum.samples == 1) return sum;
     const float share = 1 / float(sum.samples);
     sum.position = sum.position * share;
+    const auto hit = geometry.intersect(eye, normalized(sum.position - eye));
+    if (hit && hit->object == sum.object && length(hit->position - sum.position) < reach_m)
+        sum.position = hit->position;
+    // Diffuse light is linear in the normal: the mean of normals that differ is shorter, and its light less.
+    sum.look.albedo = sum.look.albedo * (share * share * length(sum.normal));
     sum.normal = normalized(sum.normal);
     sum.view = normalized(sum.view);
-    sum.look.albedo = sum.look.albedo * share;
     sum.look.roughness *= share;
     sum.look.f0 *= share;
     return sum;
@@ -77,19 +82,20 @@ struct Tile {
 std::vector<Point> trace_pixel(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int x, int y) {
     const int side = int(std::lround(std::sqrt(scene.samples)));
     std::vector<Point> points;
+    // A pixel's own width, and more for a surface that tilts away.
+    const auto reach_m = [&](Float3 place) { return 3 * camera.pixel_angle() * length(place - camera.position()); };
     for (int s = 0; s < scene.samples; ++s) {
         const Float3 ray = camera.ray(x + (s % side + 0.5) / side, y + (s / side + 0.5) / side);
         const auto hit = geometry.intersect(camera.position(), ray);
         if (!hit) continue;
         Point point = make_point(scene, *hit, ray);
         point.weight = 1.0f / float(scene.samples);
-        // A pixel's own width, and more for a surface that tilts away.
-        const float reach_m = 3 * camera.pixel_angle() * length(hit->position - camera.position());
-        const auto merged = [&](Point& p) { return merge(p, point, reach_m); };
+        const auto merged = [&](Point& p) { return merge(p, point, reach_m(hit->position)); };
         if (scene.merges_samples && std::any_of(points.begin(), points.end(), merged)) continue;
         points.push_back(point);
     }
-    for (Point& point : points) point = mean(point);
+    for (Point& point : points)
+        point = mean(point, geometry, camera.position(), reach_m(point.position * (1 / float(point.samples))));
     return points;
 }
 
