@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Meshes become Embree triangles at their pose of the moment, spheres stay exact spheres.
+// Meshes become Embree triangles at their place of the moment, spheres stay exact spheres.
 #include "geometry.hpp"
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 
@@ -11,11 +12,10 @@ namespace ols {
 
 namespace {
 
-RTCGeometry mesh_geometry(RTCDevice device, const Mesh& mesh, const Pose& pose) {
+RTCGeometry mesh_geometry(RTCDevice device, const Mesh& mesh) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<Float3*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Float3), mesh.positions.size()));
-    for (size_t i = 0; i < mesh.positions.size(); ++i) vertices[i] = pose.point(mesh.positions[i]);
+    rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Float3),
+                            mesh.positions.size());
     auto* triangles = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), mesh.triangles.size()));
     for (size_t i = 0; i < mesh.triangles.size(); ++i)
@@ -23,12 +23,9 @@ RTCGeometry mesh_geometry(RTCDevice device, const Mesh& mesh, const Pose& pose) 
     return geometry;
 }
 
-RTCGeometry sphere_geometry(RTCDevice device, const Sphere& sphere, const Pose& pose) {
+RTCGeometry sphere_geometry(RTCDevice device) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
-    auto* point = static_cast<float*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 4 * sizeof(float), 1));
-    const Float3 center = pose.point(sphere.center_m);
-    point[0] = center.x, point[1] = center.y, point[2] = center.z, point[3] = sphere.radius_m;
+    rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 4 * sizeof(float), 1);
     return geometry;
 }
 
@@ -37,11 +34,24 @@ T interpolate(const std::vector<T>& values, const Triangle& triangle, float u, f
     return values[triangle.vertex[0]] * (1 - u - v) + values[triangle.vertex[1]] * u + values[triangle.vertex[2]] * v;
 }
 
+// An object as it stands now.
+struct Placed {
+    Placement placement;
+    // Of a mesh whose face is not neutral, before the pose; else empty.
+    std::vector<Float3> positions, normals;
+    RTCGeometry geometry;  // the scene's
+
+    const std::vector<Float3>& positions_of(const Mesh& mesh) const {
+        return positions.empty() ? mesh.positions : positions;
+    }
+    const std::vector<Float3>& normals_of(const Mesh& mesh) const { return normals.empty() ? mesh.normals : normals; }
+};
+
 }  // namespace
 
 struct Geometry::State {
     const Scene* scene;
-    std::vector<Pose> poses;
+    std::vector<Placed> placed;
     RTCDevice device;
     RTCScene embree;
 
@@ -49,32 +59,89 @@ struct Geometry::State {
         rtcReleaseScene(embree);
         rtcReleaseDevice(device);
     }
+    void add(unsigned id);
+    void place(unsigned id, const Placement& placement);
 };
+
+void Geometry::State::add(unsigned id) {
+    const Object& object = scene->objects[id];
+    const Mesh* mesh = std::get_if<Mesh>(&object.shape);
+    RTCGeometry geometry = mesh ? mesh_geometry(device, *mesh) : sphere_geometry(device);
+    placed[id].geometry = geometry;
+    rtcAttachGeometryByID(embree, geometry, id);
+    rtcReleaseGeometry(geometry);
+    // What moves gets its hierarchy once, at rest, and then only new bounds: a hit does not depend on where it was
+    // before.
+    if (mesh && moves(object)) rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
+    place(id,
+          moves(object) ? Placement{{}, std::vector<double>(object.expressions.size(), 0)} : placement_at(object, 0));
+}
+
+void Geometry::State::place(unsigned id, const Placement& placement) {
+    const Object& object = scene->objects[id];
+    Placed& now = placed[id];
+    now.placement = placement;
+    void* buffer = rtcGetGeometryBufferData(now.geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+    if (const Mesh* mesh = std::get_if<Mesh>(&object.shape)) {
+        if (!object.expressions.empty()) {
+            now.positions = deformed_positions(*mesh, object.expressions, placement.weights);
+            now.normals = smooth_normals(now.positions, mesh->triangles);
+        }
+        auto* vertices = static_cast<Float3*>(buffer);
+        for (const Float3 p : now.positions_of(*mesh)) *vertices++ = placement.pose.point(p);
+    } else {
+        const Sphere& sphere = std::get<Sphere>(object.shape);
+        const Float3 center = placement.pose.point(sphere.center_m);
+        auto* point = static_cast<float*>(buffer);
+        point[0] = center.x, point[1] = center.y, point[2] = center.z, point[3] = sphere.radius_m;
+    }
+    rtcUpdateGeometryBuffer(now.geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+    rtcCommitGeometry(now.geometry);
+}
 
 Geometry::Geometry(const Scene& scene, double time_us) : state_(std::make_unique<State>()) {
     state_->scene = &scene;
     state_->device = rtcNewDevice(nullptr);
     assert(state_->device);
     state_->embree = rtcNewScene(state_->device);
+    const bool moving =
+        std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return moves(o); });
     // Robust: no ray slips through the edge between two triangles.
-    rtcSetSceneFlags(state_->embree, RTC_SCENE_FLAG_ROBUST);
-    for (size_t i = 0; i < scene.objects.size(); ++i) {
-        const Object& object = scene.objects[i];
-        const Pose pose = pose_at(object.motion, time_us);
-        state_->poses.push_back(pose);
-        const Mesh* mesh = std::get_if<Mesh>(&object.shape);
-        RTCGeometry geometry = mesh ? mesh_geometry(state_->device, *mesh, pose)
-                                    : sphere_geometry(state_->device, std::get<Sphere>(object.shape), pose);
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometryByID(state_->embree, geometry, unsigned(i));
-        rtcReleaseGeometry(geometry);
-    }
+    rtcSetSceneFlags(state_->embree,
+                     moving ? RTCSceneFlags(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC) : RTC_SCENE_FLAG_ROBUST);
+    // A hierarchy of one hierarchy an object, so that one may move: that is what Embree makes of "low" quality, which
+    // is said of the scene. The objects have their own, which stays "medium".
+    if (moving) rtcSetSceneBuildQuality(state_->embree, RTC_BUILD_QUALITY_LOW);
+    state_->placed.resize(scene.objects.size());
+    for (unsigned i = 0; i < scene.objects.size(); ++i) state_->add(i);
     rtcCommitScene(state_->embree);
+    place(time_us);
 }
 
 Geometry::~Geometry() = default;
 Geometry::Geometry(Geometry&&) noexcept = default;
 Geometry& Geometry::operator=(Geometry&&) noexcept = default;
+
+bool Geometry::place(double time_us) {
+    bool moved = false;
+    for (unsigned i = 0; i < state_->placed.size(); ++i) {
+        const Placement placement = placement_at(state_->scene->objects[i], time_us);
+        if (placement == state_->placed[i].placement) continue;
+        state_->place(i, placement);
+        moved = true;
+    }
+    if (moved) rtcCommitScene(state_->embree);
+    return moved;
+}
+
+Float3 Geometry::position_of(const SurfaceHit& hit) const {
+    const Object& object = state_->scene->objects[hit.object];
+    const Placed& now = state_->placed[hit.object];
+    if (const Mesh* mesh = std::get_if<Mesh>(&object.shape))
+        return now.placement.pose.point(
+            interpolate(now.positions_of(*mesh), mesh->triangles[hit.triangle], hit.u, hit.v));
+    return now.placement.pose.point(hit.rest_position);
+}
 
 std::optional<SurfaceHit> Geometry::intersect(Float3 origin, Float3 direction) const {
     RTCIntersectContext context;
@@ -88,15 +155,17 @@ std::optional<SurfaceHit> Geometry::intersect(Float3 origin, Float3 direction) c
     const Object& object = state_->scene->objects[ray.hit.geomID];
     SurfaceHit hit;
     hit.object = ray.hit.geomID;
-    hit.pose = state_->poses[hit.object];
+    const Placed& now = state_->placed[hit.object];
+    hit.pose = now.placement.pose;
     uint32_t group = 0;
     if (const Mesh* mesh = std::get_if<Mesh>(&object.shape)) {
         const Triangle& triangle = mesh->triangles[ray.hit.primID];
         group = triangle.group;
         hit.rest_position = interpolate(mesh->positions, triangle, ray.hit.u, ray.hit.v);
-        hit.rest_normal = normalized(interpolate(mesh->normals, triangle, ray.hit.u, ray.hit.v));
+        hit.rest_normal = normalized(interpolate(now.normals_of(*mesh), triangle, ray.hit.u, ray.hit.v));
         hit.mask = interpolate(mesh->masks, triangle, ray.hit.u, ray.hit.v);
-        hit.position = hit.pose.point(hit.rest_position);
+        hit.triangle = ray.hit.primID, hit.u = ray.hit.u, hit.v = ray.hit.v;
+        hit.position = position_of(hit);
         hit.normal = hit.pose.turn(hit.rest_normal);
     } else {
         const Sphere& sphere = std::get<Sphere>(object.shape);

@@ -23,23 +23,32 @@ struct RayPacket {
 struct SurfaceHit {
     Float3 position;       // metres, at this moment
     Float3 normal;         // unit, interpolated, at this moment
-    Float3 rest_position;  // of the object before it moved
-    Float3 rest_normal;
+    Float3 rest_position;  // of the object before it moved, its face neutral
+    Float3 rest_normal;    // of the object before it moved, its face as it is
     Float3 mask;
     uint32_t object, material;
+    uint32_t triangle = 0;  // of a mesh, with the place in it: weights of its second and third corner
+    float u = 0, v = 0;
     Pose pose;
 };
 
 class Geometry {
   public:
-    // Places every object at its pose and builds the hierarchy; the scene must outlive this.
+    // Builds the hierarchy and places every object; the scene must outlive this.
     Geometry(const Scene& scene, double time_us);
     ~Geometry();
     Geometry(Geometry&&) noexcept;
     Geometry& operator=(Geometry&&) noexcept;
 
+    // Moves what moved since; false when nothing did. The geometry is then the same, to the bit, as one that was
+    // constructed at this time.
+    bool place(double time_us);
+
     // The nearest surface that a ray from `origin` along `direction` meets.
     std::optional<SurfaceHit> intersect(Float3 origin, Float3 direction) const;
+
+    // Where the surface point that a hit met, perhaps at another time, is now.
+    Float3 position_of(const SurfaceHit& hit) const;
 
     // Clears `clear[i]` for every active ray that something blocks.
     void occlude(const RayPacket& rays, std::array<bool, packet_size>& clear) const;

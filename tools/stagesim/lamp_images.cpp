@@ -51,21 +51,26 @@ void LampImages::render_chunk(const VisiblePoints::Chunk& chunk, const std::vect
     const bool sphere_lights_board = effects.active("stray");
     std::vector<uint64_t> arriving(effects.arriving().size(), 0), reflecting(effects.reflecting().size(), 0);
     std::vector<float> colors(size_t(chunk.pixels) * 3);
+    std::vector<LightPacket> packets;
+    packets.reserve(chunk.points / packet_size);
     for (const uint32_t lamp : todo) {
-        std::fill(colors.begin(), colors.end(), 0.0f);
+        packets.clear();
         for (uint32_t p = chunk.first_point; p < chunk.first_point + chunk.points; p += packet_size) {
-            LightPacket packet{points_, p, lamps[lamp], lamp, geometry, {}, {}, {}, {}, {}};
-            start(packet, sphere_lights_board);
-            for (size_t e = 0; e < arriving.size(); ++e) arriving[e] += effects.arriving()[e]->apply(packet);
+            packets.push_back({points_, p, lamps[lamp], lamp, geometry, {}, {}, {}, {}, {}});
+            start(packets.back(), sphere_lights_board);
+        }
+        for (size_t e = 0; e < arriving.size(); ++e) arriving[e] += effects.arriving()[e]->apply(packets);
+        for (LightPacket& packet : packets)
             for (int c = 0; c < 3; ++c)
                 for (int i = 0; i < packet_size; ++i)
-                    packet.reflected[c][i] = points_.albedo[c][p + i] * packet.irradiance[i];
-            for (size_t e = 0; e < reflecting.size(); ++e) reflecting[e] += effects.reflecting()[e]->apply(packet);
+                    packet.reflected[c][i] = points_.albedo[c][packet.first + i] * packet.irradiance[i];
+        for (size_t e = 0; e < reflecting.size(); ++e) reflecting[e] += effects.reflecting()[e]->apply(packets);
+        std::fill(colors.begin(), colors.end(), 0.0f);
+        for (const LightPacket& packet : packets)
             for (int i = 0; i < packet_size; ++i)
                 for (int c = 0; c < 3; ++c)
-                    colors[(points_.pixel[p + i] - chunk.first_pixel) * 3 + c] +=
-                        points_.weight[p + i] * packet.reflected[c][i];
-        }
+                    colors[(points_.pixel[packet.first + i] - chunk.first_pixel) * 3 + c] +=
+                        points_.weight[packet.first + i] * packet.reflected[c][i];
         float* image = images_[lamp].data() + size_t(chunk.first_pixel) * channels_;
         if (channels_ == 3) {
             std::copy(colors.begin(), colors.end(), image);

@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.footer("Exit codes: 0 done, 1 an error (printed), 105 and above a wrong command line.");
     int exit_code = 0;
+    ols::add_flow_verb(app, exit_code);
     ols::add_plan_verb(app, exit_code);
     ols::add_render_verb(app, exit_code);
     ols::add_run_verb(app, exit_code);

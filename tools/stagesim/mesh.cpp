@@ -58,7 +58,8 @@ class ObjParser {
     }
 
     Mesh take() {
-        if (normals_.empty()) smooth();
+        mesh_.has_own_normals = !normals_.empty();
+        if (normals_.empty()) mesh_.normals = smooth_normals(mesh_.positions, mesh_.triangles);
         return std::move(mesh_);
     }
 
@@ -104,6 +105,7 @@ class ObjParser {
         if (is_new) {
             mesh_.positions.push_back(positions_[v]);
             mesh_.masks.push_back(masks_[v]);
+            mesh_.file_vertices.push_back(uint32_t(v));
             mesh_.normals.push_back(n < 0 ? Float3{} : normals_[n]);
         }
         return entry->second;
@@ -124,22 +126,24 @@ class ObjParser {
         return true;
     }
 
-    void smooth() {
-        for (const Triangle& t : mesh_.triangles) {
-            const Float3 a = mesh_.positions[t.vertex[0]];
-            // The cross product's length is twice the area: larger faces weigh more.
-            const Float3 n = cross(mesh_.positions[t.vertex[1]] - a, mesh_.positions[t.vertex[2]] - a);
-            for (uint32_t v : t.vertex) mesh_.normals[v] = mesh_.normals[v] + n;
-        }
-        for (Float3& n : mesh_.normals) n = normalized(n);
-    }
-
     std::vector<Float3> positions_, masks_, normals_;
     std::map<std::pair<int64_t, int64_t>, uint32_t> vertices_;
     Mesh mesh_;
 };
 
 }  // namespace
+
+std::vector<Float3> smooth_normals(const std::vector<Float3>& positions, const std::vector<Triangle>& triangles) {
+    std::vector<Float3> normals(positions.size());
+    for (const Triangle& t : triangles) {
+        const Float3 a = positions[t.vertex[0]];
+        // The cross product's length is twice the area: larger faces weigh more.
+        const Float3 n = cross(positions[t.vertex[1]] - a, positions[t.vertex[2]] - a);
+        for (const uint32_t v : t.vertex) normals[v] = normals[v] + n;
+    }
+    for (Float3& n : normals) n = normalized(n);
+    return normals;
+}
 
 Result<Mesh> read_obj(const std::string& path) {
     std::ifstream file(path, std::ios::binary);

@@ -9,9 +9,20 @@ namespace ols {
 
 namespace {
 
+// What a coordinate of a cell brings to its hash.
+uint32_t hash_x(int x) {
+    return uint32_t(x) * 0x8da6b343u;
+}
+uint32_t hash_y(int y) {
+    return uint32_t(y) * 0xd8163841u;
+}
+uint32_t hash_z(int z) {
+    return uint32_t(z) * 0xcb1ab31fu;
+}
+
 // A bijective mix (the finaliser of MurmurHash3) of the cell's coordinates.
-uint32_t hash_cell(int x, int y, int z, uint32_t seed) {
-    uint32_t h = uint32_t(x) * 0x8da6b343u ^ uint32_t(y) * 0xd8163841u ^ uint32_t(z) * 0xcb1ab31fu ^ seed * 0x9e3779b9u;
+uint32_t mix_hash(uint32_t coordinates, uint32_t seed) {
+    uint32_t h = coordinates ^ seed * 0x9e3779b9u;
     h ^= h >> 16;
     h *= 0x85ebca6bu;
     h ^= h >> 13;
@@ -23,12 +34,10 @@ float unit(uint32_t hash) {
     return float(hash >> 8) * 0x1p-24f;
 }
 
-// Dot product with one of Perlin's twelve cube-edge gradients.
-float gradient(uint32_t hash, float x, float y, float z) {
-    const uint32_t h = hash & 15;
-    const float u = h < 8 ? x : y, v = h < 4 ? y : (h == 12 || h == 14 ? x : z);
-    return ((h & 1) ? -u : u) + ((h & 2) ? -v : v);
-}
+// Perlin's twelve cube-edge gradients, four of them twice.
+constexpr float gradients[16][3] = {{1, 1, 0},  {-1, 1, 0},  {1, -1, 0}, {-1, -1, 0}, {1, 0, 1},  {-1, 0, 1},
+                                    {1, 0, -1}, {-1, 0, -1}, {0, 1, 1},  {0, -1, 1},  {0, 1, -1}, {0, -1, -1},
+                                    {1, 1, 0},  {0, -1, 1},  {-1, 1, 0}, {0, -1, -1}};
 
 float fade(float t) {
     return t * t * t * (t * (t * 6 - 15) + 10);
@@ -41,10 +50,13 @@ float noise3(Float3 p, uint32_t seed) {
     const int ix = int(fx), iy = int(fy), iz = int(fz);
     const float x = p.x - fx, y = p.y - fy, z = p.z - fz;
     const float u = fade(x), v = fade(y), w = fade(z);
+    const uint32_t hx[2] = {hash_x(ix), hash_x(ix + 1)}, hy[2] = {hash_y(iy), hash_y(iy + 1)},
+                   hz[2] = {hash_z(iz), hash_z(iz + 1)};
     float corner[8];
     for (int i = 0; i < 8; ++i) {
         const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
-        corner[i] = gradient(hash_cell(ix + dx, iy + dy, iz + dz, seed), x - dx, y - dy, z - dz);
+        const float* g = gradients[mix_hash(hx[dx] ^ hy[dy] ^ hz[dz], seed) & 15];
+        corner[i] = g[0] * (x - dx) + g[1] * (y - dy) + g[2] * (z - dz);
     }
     for (int i = 0; i < 4; ++i) corner[i] = corner[2 * i] + u * (corner[2 * i + 1] - corner[2 * i]);
     for (int i = 0; i < 2; ++i) corner[i] = corner[2 * i] + v * (corner[2 * i + 1] - corner[2 * i]);
@@ -62,17 +74,26 @@ float fractal_noise3(Float3 p, int octaves, float gain, uint32_t seed) {
     return sum / total;
 }
 
-Speckle speckle3(Float3 p, uint32_t seed) {
-    const int ix = int(std::floor(p.x)), iy = int(std::floor(p.y)), iz = int(std::floor(p.z));
+Speckle speckle3(Float3 p, uint32_t seed, float within) {
+    const float fx = std::floor(p.x), fy = std::floor(p.y), fz = std::floor(p.z);
+    const int ix = int(fx), iy = int(fy), iz = int(fz);
+    const float x = p.x - fx, y = p.y - fy, z = p.z - fz;
+    // p's own cell and its neighbours along an axis, with how far away they begin.
+    constexpr int step[3] = {0, -1, 1};
+    const float gap[3][3] = {{0, x, 1 - x}, {0, y, 1 - y}, {0, z, 1 - z}};
     Speckle nearest{10, 0};
-    for (int dz = -1; dz <= 1; ++dz)
-        for (int dy = -1; dy <= 1; ++dy)
-            for (int dx = -1; dx <= 1; ++dx) {
-                const int x = ix + dx, y = iy + dy, z = iz + dz;
-                const Float3 point{x + unit(hash_cell(x, y, z, seed)), y + unit(hash_cell(x, y, z, seed + 101)),
-                                   z + unit(hash_cell(x, y, z, seed + 202))};
+    for (int k = 0; k < 3; ++k)
+        for (int j = 0; j < 3; ++j)
+            for (int i = 0; i < 3; ++i) {
+                // A little farther than the nearest so far, for rounding.
+                const float reach = std::min(within, nearest.distance) + 1e-4f;
+                if (gap[0][i] * gap[0][i] + gap[1][j] * gap[1][j] + gap[2][k] * gap[2][k] > reach * reach) continue;
+                const int cx = ix + step[i], cy = iy + step[j], cz = iz + step[k];
+                const uint32_t cell = hash_x(cx) ^ hash_y(cy) ^ hash_z(cz);
+                const Float3 point{cx + unit(mix_hash(cell, seed)), cy + unit(mix_hash(cell, seed + 101)),
+                                   cz + unit(mix_hash(cell, seed + 202))};
                 const float distance = length(p - point);
-                if (distance < nearest.distance) nearest = {distance, unit(hash_cell(x, y, z, seed + 303))};
+                if (distance < nearest.distance) nearest = {distance, unit(mix_hash(cell, seed + 303))};
             }
     return nearest;
 }

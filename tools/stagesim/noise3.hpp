@@ -15,10 +15,10 @@ float noise3(Float3 p, uint32_t seed);
 float fractal_noise3(Float3 p, int octaves, float gain, uint32_t seed);
 
 // Distance to the nearest of points scattered one a unit cell, 0 at a point (Worley 1996), and that point's own random
-// number, 0 to 1.
+// number, 0 to 1. Points farther than `within` are not looked for: the distance is then anything above it.
 struct Speckle {
     float distance, random;
 };
-Speckle speckle3(Float3 p, uint32_t seed);
+Speckle speckle3(Float3 p, uint32_t seed, float within);
 
 }  // namespace ols

@@ -27,4 +27,12 @@ Float3 Pinhole::ray(double x, double y) const {
     return to_float3(normalized(forward_ + right_ * (x - center_x_) + down_ * (y - center_y_)));
 }
 
+std::array<double, 2> Pinhole::project(Float3 place) const {
+    const Vec3 way = Vec3{place.x, place.y, place.z} - Vec3{position_.x, position_.y, position_.z};
+    const double depth = dot(way, forward_);
+    // right_ and down_ are a pixel long at unit distance, and at right angles.
+    return {center_x_ + dot(way, right_) / (dot(right_, right_) * depth),
+            center_y_ + dot(way, down_) / (dot(down_, down_) * depth)};
+}
+
 }  // namespace ols

@@ -2,6 +2,8 @@
 // The camera's rays.
 #pragma once
 
+#include <array>
+
 #include "stage/stage.hpp"
 #include "vector.hpp"
 
@@ -15,6 +17,10 @@ class Pinhole {
     Float3 position() const { return position_; }
     // Unit direction through the image point (x, y).
     Float3 ray(double x, double y) const;
+    // The image point of a place before the camera.
+    std::array<double, 2> project(Float3 place) const;
+    // Radians, in the middle of the image.
+    float pixel_angle() const { return float(length(right_)); }
 
   private:
     Float3 position_;

@@ -154,7 +154,7 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--rotate", options->rotate_deg,
                      "turn the environment about +Y, degrees: light from +Z moves to +X");
     verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
-    verb->add_option("--time-us", options->time_us, "moment of a moving scene");
+    verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene");
     verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));
     verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
     verb->add_option("--png", options->png, "preview file");

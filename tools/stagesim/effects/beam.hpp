@@ -6,13 +6,13 @@
 
 namespace ols {
 
-class Beam : public LightEffect {
+class Beam : public PacketEffect {
   public:
     const char* name() const override { return "beam"; }
     const char* evaluation() const override { return "point and lamp"; }
     std::string caller(const Setup& setup) const override;
     Stage stage() const override { return Stage::arrive; }
-    uint32_t apply(LightPacket& packet) const override;
+    uint32_t apply_packet(LightPacket& packet) const override;
 };
 
 }  // namespace ols

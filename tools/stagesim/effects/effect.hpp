@@ -7,6 +7,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "geometry.hpp"
@@ -66,8 +67,19 @@ class LightEffect : public Effect {
     enum class Stage { arrive, reflect };
     virtual Stage stage() const = 0;
     virtual void prepare(const VisiblePoints&, const std::vector<PlacedLamp>&, const Geometry&) {}
-    // Returns how many evaluations it made.
-    virtual uint32_t apply(LightPacket& packet) const = 0;
+    // All packets of a chunk of points under one lamp. Returns how many evaluations it made.
+    virtual uint64_t apply(std::span<LightPacket> packets) const = 0;
+};
+
+// An effect that looks at one packet at a time.
+class PacketEffect : public LightEffect {
+  public:
+    uint64_t apply(std::span<LightPacket> packets) const override {
+        uint64_t evaluations = 0;
+        for (LightPacket& packet : packets) evaluations += apply_packet(packet);
+        return evaluations;
+    }
+    virtual uint32_t apply_packet(LightPacket& packet) const = 0;
 };
 
 // An exposure on the sensor: counts above black, channels as the camera delivers them (1 mosaic, 3 RGB).

@@ -21,7 +21,7 @@ std::vector<std::unique_ptr<Effect>> all_effects(const Setup& setup, const std::
     all.push_back(std::make_unique<Movement>());
     all.push_back(std::make_unique<Falloff>());
     all.push_back(std::make_unique<Beam>());
-    all.push_back(std::make_unique<Shadows>());
+    all.push_back(std::make_unique<Shadows>(setup));
     const bool shadows = !disabled.contains("shadows") && !all.back()->caller(setup).empty();
     all.push_back(std::make_unique<Specular>());
     all.push_back(std::make_unique<StrayLight>(setup, shadows));

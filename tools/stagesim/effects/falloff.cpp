@@ -13,7 +13,7 @@ std::string Falloff::caller(const Setup& setup) const {
     return fmt::format("stage: {} lamps stand {:g} m from the centre", setup.stage.lamp_count(), setup.stage.radius_m);
 }
 
-uint32_t Falloff::apply(LightPacket& packet) const {
+uint32_t Falloff::apply_packet(LightPacket& packet) const {
     const VisiblePoints& points = packet.points;
     const PlacedLamp& lamp = packet.lamp;
     for (int i = 0; i < packet_size; ++i) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rigid motion: the scene is placed anew at the middle of every exposure. Within an exposure (some 0.4 ms) it stands.
+// Motion, of objects and of faces: the scene is placed anew at the middle of every exposure. Within an exposure (some 0.4 ms) it stands.
 #pragma once
 
 #include "effect.hpp"
@@ -12,7 +12,7 @@ class Movement : public Effect {
     const char* evaluation() const override { return "placing of the scene"; }
     std::string caller(const Setup& setup) const override {
         for (const Object& object : setup.scene.objects)
-            if (moves(object.motion)) return "scene: '" + object.name + "' moves";
+            if (moves(object)) return "scene: '" + object.name + "' moves";
         return "";
     }
 };

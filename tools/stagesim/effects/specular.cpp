@@ -26,7 +26,7 @@ float ggx(float n_h, float n_l, float n_v, float h_v, float alpha, float f0) {
     return distribution * visibility * (f0 + (1 - f0) * m2 * m2 * m);
 }
 
-uint32_t Specular::apply(LightPacket& packet) const {
+uint32_t Specular::apply_packet(LightPacket& packet) const {
     const VisiblePoints& points = packet.points;
     uint32_t evaluations = 0;
     for (int i = 0; i < packet_size; ++i) {

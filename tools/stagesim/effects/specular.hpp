@@ -6,13 +6,13 @@
 
 namespace ols {
 
-class Specular : public LightEffect {
+class Specular : public PacketEffect {
   public:
     const char* name() const override { return "specular"; }
     const char* evaluation() const override { return "point and lamp"; }
     std::string caller(const Setup& setup) const override;
     Stage stage() const override { return Stage::reflect; }
-    uint32_t apply(LightPacket& packet) const override;
+    uint32_t apply_packet(LightPacket& packet) const override;
 };
 
 // The lobe D V F for cosines of the half vector, light and view to the normal and of the half vector to the view;

@@ -95,7 +95,7 @@ void StrayLight::prepare(const VisiblePoints& points, const std::vector<PlacedLa
     find_shares(points, geometry);
 }
 
-uint32_t StrayLight::apply(LightPacket& packet) const {
+uint32_t StrayLight::apply_packet(LightPacket& packet) const {
     const float* radiosity = radiosity_.data() + packet.lamp_index * patches_.size();
     uint32_t evaluations = 0;
     for (int i = 0; i < packet_size; ++i) {

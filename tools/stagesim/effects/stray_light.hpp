@@ -7,7 +7,7 @@
 
 namespace ols {
 
-class StrayLight : public LightEffect {
+class StrayLight : public PacketEffect {
   public:
     const char* name() const override { return "stray"; }
     const char* evaluation() const override { return "point and board patch"; }
@@ -16,7 +16,7 @@ class StrayLight : public LightEffect {
 
     StrayLight(const Setup& setup, bool cast_shadows);
     void prepare(const VisiblePoints& points, const std::vector<PlacedLamp>& lamps, const Geometry& geometry) override;
-    uint32_t apply(LightPacket& packet) const override;
+    uint32_t apply_packet(LightPacket& packet) const override;
 
   private:
     struct Patch {

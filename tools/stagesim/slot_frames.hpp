@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// The frames of a cycle without board, clock and ring: what a bench or a test of later stages records quickly. The whole
+// chain is `stagesim run`.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "renderer.hpp"
+#include "stage/sequence.hpp"
+
+namespace ols {
+
+// Scene time of the middle of a slot's exposure: time 0 is the first trigger that this camera gets. Frozen at this
+// moment, `Renderer::light` gives the truth of what is made of that slot.
+double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32_t cycle, size_t slot);
+
+// The frames that the camera delivers of a cycle, by slot, each identified and with the noise of its place in the take;
+// null where the camera is not triggered. Frames are the same, to the bit, as those of VirtualCamera, and do not depend
+// on which cycles were rendered before. `renderer` must be made of `setup`.
+// Error: a slot of grey levels, whose planes only the board lays out in time.
+Result<std::vector<std::shared_ptr<const Frame>>> render_slots(Renderer& renderer, const Setup& setup,
+                                                               const Sequence& sequence, uint32_t cycle);
+
+}  // namespace ols
