@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Resizing, concatenation and warping of and by flow fields.
+// Resizing of flow fields, and images seen through them.
 #include "reflectance/flow_field.hpp"
 
 #include <algorithm>
@@ -21,15 +21,6 @@ Place place_of(float coordinate, int size) {
     const float held = coordinate > 0 ? std::min(coordinate, float(size - 1)) : 0.0f;
     const int at = std::min(int(held), std::max(size - 2, 0));
     return {at, held - float(at)};
-}
-
-float bilinear(const std::vector<float>& plane, int width, int height, float x, float y) {
-    const Place px = place_of(x, width), py = place_of(y, height);
-    const float* row = &plane[size_t(py.at) * size_t(width) + size_t(px.at)];
-    const int right = width > 1 ? 1 : 0, down = height > 1 ? width : 0;
-    const float top = row[0] + px.fraction * (row[right] - row[0]);
-    const float bottom = row[down] + px.fraction * (row[down + right] - row[down]);
-    return top + py.fraction * (bottom - top);
 }
 
 // Keys' cubic convolution kernel, a = -1/2, for the samples at -1, 0, 1, 2 from a fraction t.
@@ -68,19 +59,6 @@ FlowField resized(const FlowField& flow, int width, int height) {
     };
     resize(flow.u, out.u, double(width) / flow.width);
     resize(flow.v, out.v, double(height) / flow.height);
-    return out;
-}
-
-FlowField concatenated(const FlowField& a, const FlowField& b) {
-    assert(a.width == b.width && a.height == b.height);
-    FlowField out(a.width, a.height);
-    for (int y = 0; y < a.height; ++y)
-        for (int x = 0; x < a.width; ++x) {
-            const size_t at = size_t(y) * size_t(a.width) + size_t(x);
-            const float fx = float(x) + a.u[at], fy = float(y) + a.v[at];
-            out.u[at] = a.u[at] + bilinear(b.u, b.width, b.height, fx, fy);
-            out.v[at] = a.v[at] + bilinear(b.v, b.width, b.height, fx, fy);
-        }
     return out;
 }
 

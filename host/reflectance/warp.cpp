@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Eight target pixels at a time: their sources mostly lie within sixteen pixels of two or three rows, which fit registers, so
-// that the gather is a byte shuffle. Where motion is wilder than that, a pixel at a time, by the same arithmetic.
+// Runs of eight target pixels. Most lie on a line of motion along which neither row nor column slips by more than one pixel:
+// their counts are what lies under them, shifted as a whole, or one pixel further; nothing is gathered, and two runs fill a
+// vector. Else their sources mostly lie within sixteen pixels of two or three rows, which fit registers, so that the gather is
+// a byte shuffle. Where motion is wilder than that, a pixel at a time, by the same arithmetic.
 #include "reflectance/warp.hpp"
 
 #include <algorithm>
@@ -125,190 +127,278 @@ HWY_INLINE void eight(const CountPlane& source, const Shuffled& s, int16_t* out)
     hn::StoreU(hn::IfThenElse(hn::MaskFromVec(gone), none, sum), d, out);
 }
 
-// Positions of eight pixels from (x, y), as whole pixels and weights.
-HWY_INLINE void find_sources(const CountPlane& source, const GroupMotion& motion, float fraction_of_step, int x, int y,
+#endif  // HWY_TARGET != HWY_SCALAR
+
+// Eight positions as whole pixels and weights.
+HWY_INLINE void find_sources(const CountPlane& source, const GroupMotion& motion, int run, int y, float fraction,
                              Sources& s) {
+    float at_x[at_once], at_y[at_once];
+    motion.run_positions(run, y, fraction, at_x, at_y);
     const hn::CappedTag<float, at_once> df;
     const hn::RebindToSigned<decltype(df)> di;
     const hn::Rebind<int16_t, decltype(df)> d16;
-    const auto part = [&](auto coordinate, int size, int16_t* whole, int16_t* weight) HWY_ATTR {
-        const auto most = hn::Set(df, float(size - 1)), zero = hn::Zero(df);
-        const auto held = hn::Min(hn::Max(coordinate, zero), most);
+    const auto part = [&](const float* coordinates, int size, int16_t* whole, int16_t* weight) HWY_ATTR {
+        const auto coordinate = hn::LoadU(df, coordinates);
+        const auto held = hn::Min(hn::Max(coordinate, hn::Zero(df)), hn::Set(df, float(size - 1)));
         const auto at_pixel = hn::ConvertTo(di, held);
-        const auto fraction = hn::Sub(held, hn::ConvertTo(df, at_pixel));
+        const auto rest = hn::Sub(held, hn::ConvertTo(df, at_pixel));
         hn::StoreU(hn::DemoteTo(d16, at_pixel), d16, whole);
-        const auto units = hn::NearestInt(hn::Mul(fraction, hn::Set(df, float(1 << one_log2))));
+        const auto units = hn::NearestInt(hn::Mul(rest, hn::Set(df, float(1 << one_log2))));
         hn::StoreU(hn::DemoteTo(d16, units), d16, weight);  // saturates
         return hn::Not(hn::Eq(held, coordinate));           // NaN is outside, too
     };
     for (int k = 0; k < at_once; k += int(hn::Lanes(df))) {
-        const size_t from = size_t(y) * size_t(motion.width()) + size_t(x + k);
-        const auto fraction = hn::Set(df, fraction_of_step);
-        const auto vector = [&](const std::vector<float>& base, const std::vector<float>& step) HWY_ATTR {
-            return hn::Add(hn::LoadU(df, &base[from]), hn::Mul(fraction, hn::LoadU(df, &step[from])));
-        };
-        const auto u = vector(motion.base().u, motion.step().u), v = vector(motion.base().v, motion.step().v);
-        const auto out_x = part(hn::Add(hn::Iota(df, float(x + k)), u), source.width, s.x + k, s.fx + k);
-        const auto out_y = part(hn::Add(hn::Set(df, float(y)), v), source.height, s.y + k, s.fy + k);
+        const auto out_x = part(at_x + k, source.width, s.x + k, s.fx + k);
+        const auto out_y = part(at_y + k, source.height, s.y + k, s.fy + k);
         const auto outside = hn::VecFromMask(di, hn::RebindMask(di, hn::Or(out_x, out_y)));
         hn::StoreU(hn::DemoteTo(d16, outside), d16, s.outside + k);
     }
 }
 
-// Eight pixels with vectors of their own.
-template <int precision>
-void warp_pixels(const CountPlane& source, const GroupMotion& motion, float fraction, int x, int y, int16_t* out) {
-    const D16 d;
-    Sources s;
-    find_sources(source, motion, fraction, x, y, s);
-    // Motion is smooth: the first pixel tells where the others are, mostly.
-    const int base_x = std::clamp(s.x[0] - table_slack, 0, source.width - table_pixels);
-    const int base_y = std::min(s.y[0], s.y[at_once - 1]);
-    const V16 column = hn::Sub(hn::Load(d, s.x), hn::Set(d, int16_t(base_x)));
-    const V16 row = hn::Sub(hn::Load(d, s.y), hn::Set(d, int16_t(base_y)));
-    const V16 next = hn::Min(hn::Add(column, hn::Set(d, 1)), hn::Set(d, int16_t(source.width - 1 - base_x)));
-    const V16 beyond = hn::Or(hn::AndNot(hn::Set(d, table_pixels - 1), hn::Or(column, next)),
-                              hn::AndNot(hn::Set(d, 1), row));  // negative ones have high bits, too
-    if (hn::AllTrue(d, hn::Eq(beyond, hn::Zero(d))))
-        return eight<precision>(
-            source, {base_x, base_y, column, next, row, hn::Load(d, s.fx), hn::Load(d, s.fy), hn::Load(d, s.outside)},
-            out);
-    for (int k = 0; k < at_once; ++k) out[k] = pixel(source, s, k, precision);
+void warp_pixels(const CountPlane& source, const Sources& s, int precision, int16_t* out) {
+    for (int k = 0; k < std::min(at_once, source.width); ++k) out[k] = pixel(source, s, k, precision);
 }
 
-// Runs of one row that lie on lines, in units of 2^-11 pixels: relative to whole base pixels, what fits int16.
-constexpr int line_log2 = 11;
-constexpr int slope_log2 = 13;  // two more bits for what is multiplied by seven
-struct LineRow {
-    std::vector<int32_t> base_x, x, dx, base_y, y, dy;  // x, y: of the first pixel, less the base; dx, dy: less 1, 0
-    std::vector<int32_t> fits;                          // not 0: on a line, inside the plane, within the table
-
-    explicit LineRow(int runs) {
-        for (auto* list : {&base_x, &x, &dx, &base_y, &y, &dy, &fits}) list->resize(size_t(runs) + 16);
+// A run by its own positions.
+template <int precision>
+void warp_run(const CountPlane& source, const GroupMotion& motion, int run, int y, float fraction, int16_t* out) {
+    Sources s;
+    find_sources(source, motion, run, y, fraction, s);
+#if HWY_TARGET != HWY_SCALAR
+    if (source.width >= table_pixels) {
+        const D16 d;
+        // Motion is smooth: the first pixel tells where the others are, mostly.
+        const int base_x = std::clamp(s.x[0] - table_slack, 0, source.width - table_pixels);
+        const int base_y = std::min(s.y[0], s.y[at_once - 1]);
+        const V16 column = hn::Sub(hn::Load(d, s.x), hn::Set(d, int16_t(base_x)));
+        const V16 row = hn::Sub(hn::Load(d, s.y), hn::Set(d, int16_t(base_y)));
+        const V16 next = hn::Min(hn::Add(column, hn::Set(d, 1)), hn::Set(d, int16_t(source.width - 1 - base_x)));
+        const V16 beyond = hn::Or(hn::AndNot(hn::Set(d, table_pixels - 1), hn::Or(column, next)),
+                                  hn::AndNot(hn::Set(d, 1), row));  // negative ones have high bits, too
+        if (hn::AllTrue(d, hn::Eq(beyond, hn::Zero(d))))
+            return eight<precision>(
+                source,
+                {base_x, base_y, column, next, row, hn::Load(d, s.fx), hn::Load(d, s.fy), hn::Load(d, s.outside)}, out);
     }
+#endif
+    warp_pixels(source, s, precision, out);
+}
+
+// Runs of one row on lines, in units of 2^-13 pixels.
+constexpr int line_log2 = 13;
+constexpr int line_one = 1 << line_log2;
+struct LineRow {
+    std::vector<int16_t> start;   // four a run: x, its change from pixel to pixel, y, its change; less `offset`
+    std::vector<int32_t> offset;  // of the count before which no pixel of the run slips, from the plane's begin
+    std::vector<int16_t> rows;    // that all pixels of the run lie above: 1 or 2; 0 where the run does not fit
+    bool is_still;                // all of the row
+
+    explicit LineRow(int runs) : start(4 * size_t(runs) + 64), offset(size_t(runs) + 16), rows(size_t(runs) + 16) {}
 };
 
+// A line fits when along it the whole part of neither coordinate's vector changes by more than one, and when all counts that
+// are read for it, three columns of eight and two or three rows, are the plane's.
 void find_lines(const CountPlane& source, const GroupMotion& motion, float fraction, int y, LineRow& row) {
     const hn::CappedTag<float, 16> df;
     const hn::RebindToSigned<decltype(df)> di;
+    const hn::Rebind<int16_t, decltype(df)> d16;
     const int runs = motion.runs();
     const GroupMotion::Lines& lines = motion.lines();
-    const auto step_share = hn::Set(df, fraction), unit = hn::Set(df, float(1 << line_log2)),
-               slope_unit = hn::Set(df, float(1 << slope_log2));
-    const auto last = hn::Set(di, at_once - 1), low = hn::Set(di, (1 << line_log2) - 1);
+    const auto share = hn::Set(df, fraction), unit = hn::Set(df, float(line_one));
+    const auto last = hn::Set(di, at_once - 1), zero = hn::Zero(di);
+    auto moved = zero;
     for (int r = 0; r < runs; r += int(hn::Lanes(df))) {
         const size_t from = size_t(y) * size_t(runs) + size_t(r);
         const auto vector = [&](const std::vector<float>& base, const std::vector<float>& step) HWY_ATTR {
-            return hn::Add(hn::LoadU(df, &base[from]), hn::Mul(step_share, hn::LoadU(df, &step[from])));
+            return hn::Add(hn::LoadU(df, &base[from]), hn::Mul(share, hn::LoadU(df, &step[from])));
         };
-        const auto fixed = [&](auto pixels, auto per_pixel)
-                               HWY_ATTR { return hn::NearestInt(hn::Mul(pixels, per_pixel)); };
-        const auto first_x = hn::Mul(hn::Iota(df, float(r)), hn::Set(df, float(at_once)));
-        const auto u = hn::Add(first_x, vector(lines.base_u, lines.step_u));
-        const auto v = hn::Add(hn::Set(df, float(y)), vector(lines.base_v, lines.step_v));
-        const auto du = vector(lines.base_du, lines.step_du);
-        const auto dv = vector(lines.base_dv, lines.step_dv);
-        const auto x = fixed(u, unit), dx = fixed(du, slope_unit), at_y = fixed(v, unit), dy = fixed(dv, slope_unit);
-        const auto reach = [&](auto slope)
-                               HWY_ATTR { return hn::ShiftRight<slope_log2 - line_log2>(hn::Mul(slope, last)); };
-        const auto end_x = hn::Add(hn::Add(x, hn::Set(di, (at_once - 1) << line_log2)), reach(dx));
-        const auto end_y = hn::Add(at_y, reach(dy));
-        const auto least_y = hn::Min(at_y, end_y), most_y = hn::Max(at_y, end_y);
-        const auto base_x = hn::ShiftRight<line_log2>(x), base_y = hn::ShiftRight<line_log2>(least_y);
-        hn::StoreU(base_x, di, &row.base_x[size_t(r)]);
-        hn::StoreU(hn::And(x, low), di, &row.x[size_t(r)]);
-        hn::StoreU(dx, di, &row.dx[size_t(r)]);
-        hn::StoreU(base_y, di, &row.base_y[size_t(r)]);
-        hn::StoreU(hn::Sub(at_y, hn::ShiftLeft<line_log2>(base_y)), di, &row.y[size_t(r)]);
-        hn::StoreU(dy, di, &row.dy[size_t(r)]);
-        // Where it is no line the vectors are NaN, which equals nothing; huge ones would overflow.
-        const auto limit = hn::Set(df, 30000.0f);
-        const auto is_line = hn::And(hn::Eq(u, u), hn::And(hn::Lt(hn::Abs(u), limit), hn::Lt(hn::Abs(v), limit)));
-        auto fits = hn::VecFromMask(di, hn::RebindMask(di, is_line));
-        const auto require = [&](auto condition) HWY_ATTR { fits = hn::And(fits, hn::VecFromMask(di, condition)); };
-        const auto none = hn::Set(di, -1);
+        const auto u = vector(lines.base_u, lines.step_u), v = vector(lines.base_v, lines.step_v);
+        const auto du = vector(lines.base_du, lines.step_du), dv = vector(lines.base_dv, lines.step_dv);
+        const auto x = hn::NearestInt(hn::Mul(u, unit)), dx = hn::NearestInt(hn::Mul(du, unit));
+        const auto at_y = hn::NearestInt(hn::Mul(v, unit)), dy = hn::NearestInt(hn::Mul(dv, unit));
+        const auto end_x = hn::Add(x, hn::Mul(dx, last)), end_y = hn::Add(at_y, hn::Mul(dy, last));
+        const auto slip_x = hn::ShiftRight<line_log2>(hn::Min(x, end_x));
+        const auto slip_y = hn::ShiftRight<line_log2>(hn::Min(at_y, end_y));
+        const auto most_x = hn::ShiftRight<line_log2>(hn::Max(x, end_x));
+        const auto most_y = hn::ShiftRight<line_log2>(hn::Max(at_y, end_y));
 
-        require(hn::Lt(hn::Abs(dx), hn::Set(di, 1 << (slope_log2 - 1))));
-        require(hn::Lt(hn::Abs(dy), hn::Set(di, 1 << (slope_log2 - 1))));
-        require(hn::Gt(x, none));
-        require(hn::Lt(base_x, hn::Set(di, source.width - table_pixels + 1)));
-        require(hn::Lt(end_x, hn::Set(di, (source.width - 1) << line_log2)));
-        require(hn::Gt(least_y, none));
-        require(hn::Lt(most_y, hn::Set(di, (source.height - 1) << line_log2)));
-        require(hn::Lt(hn::ShiftRight<line_log2>(most_y), hn::Add(base_y, hn::Set(di, 2))));
-        hn::StoreU(fits, di, &row.fits[size_t(r)]);
+        const auto run = hn::Iota(di, r);
+        const auto first_x = hn::Min(hn::ShiftLeft<3>(run), hn::Set(di, source.width - at_once));
+        const auto base_x = hn::Add(first_x, slip_x), base_y = hn::Add(hn::Set(di, y), slip_y);
+        const auto below = hn::Sub(most_y, slip_y);
+        // Where it is no line the vectors are NaN, which is below nothing; huge ones would overflow.
+        const auto limit = hn::Set(df, 30000.0f), steepest = hn::Set(df, 1.0f);
+        const auto is_line = hn::And(hn::And(hn::Lt(hn::Abs(u), limit), hn::Lt(hn::Abs(v), limit)),
+                                     hn::And(hn::Lt(hn::Abs(du), steepest), hn::Lt(hn::Abs(dv), steepest)));
+        auto fits = hn::VecFromMask(di, hn::RebindMask(di, is_line));
+        const auto not_line = hn::Not(fits);
+        const auto forbid = [&](auto condition) HWY_ATTR { fits = hn::AndNot(hn::VecFromMask(di, condition), fits); };
+        const auto one = hn::Set(di, 1);
+        forbid(hn::Gt(hn::Sub(most_x, slip_x), one));
+        forbid(hn::Gt(below, one));
+        forbid(hn::Lt(base_x, zero));
+        forbid(hn::Gt(base_x, hn::Set(di, source.width - at_once - 2)));
+        forbid(hn::Lt(base_y, zero));
+        forbid(hn::Gt(hn::Add(base_y, below), hn::Set(di, source.height - 2)));
+        const auto movement = hn::Or(not_line, hn::Or(hn::Or(x, dx), hn::Or(at_y, dy)));
+        moved = hn::Or(moved, hn::And(movement, hn::VecFromMask(di, hn::Lt(run, hn::Set(di, runs)))));
+
+        const auto within = [&](auto value, auto slip)
+                                HWY_ATTR { return hn::DemoteTo(d16, hn::Sub(value, hn::ShiftLeft<line_log2>(slip))); };
+        hn::StoreInterleaved4(within(x, slip_x), hn::DemoteTo(d16, dx), within(at_y, slip_y), hn::DemoteTo(d16, dy),
+                              d16, &row.start[4 * size_t(r)]);
+        hn::StoreU(hn::Add(hn::Mul(base_y, hn::Set(di, int32_t(source.pitch))), base_x), di, &row.offset[size_t(r)]);
+        hn::StoreU(hn::DemoteTo(d16, hn::And(fits, hn::Add(below, one))), d16, &row.rows[size_t(r)]);
+    }
+    row.is_still = hn::AllTrue(di, hn::Eq(moved, zero));
+}
+
+#if HWY_TARGET == HWY_SCALAR
+
+constexpr int runs_at_once = 1;
+
+template <int precision>
+void warp_lines(const CountPlane& source, const LineRow& row, size_t r, size_t, int16_t* out) {
+    Sources s;
+    const int16_t* const start = &row.start[4 * r];
+    const int base_x = row.offset[r] % int(source.pitch), base_y = row.offset[r] / int(source.pitch);
+    for (int k = 0; k < at_once; ++k) {
+        const int x = start[0] + k * start[1], y = start[2] + k * start[3];
+        s.x[k] = int16_t(base_x + k + (x >> line_log2));
+        s.y[k] = int16_t(base_y + (y >> line_log2));
+        s.fx[k] = int16_t((x % line_one) << (one_log2 - line_log2));
+        s.fy[k] = int16_t((y % line_one) << (one_log2 - line_log2));
+        s.outside[k] = 0;
+    }
+    warp_pixels(source, s, precision, out);
+}
+
+#else
+
+// A run a block of 128 bits, two where vectors have two.
+using Runs = hn::CappedTag<int16_t, 2 * at_once>;
+constexpr int runs_at_once = int(hn::MaxLanes(Runs())) / at_once;
+using RunVector = hn::Vec<Runs>;
+using RunMask = hn::Mask<Runs>;
+
+struct RunPointers {
+    const int16_t *first, *second;
+};
+
+HWY_INLINE RunVector load_runs(RunPointers at, int column) {
+    const Runs d;
+    if constexpr (runs_at_once == 1) {
+        return hn::LoadU(d, at.first + column);
+    } else {
+        const hn::Half<Runs> half;
+        return hn::Combine(d, hn::LoadU(half, at.second + column), hn::LoadU(half, at.first + column));
     }
 }
 
-template <int precision>
-HWY_INLINE void warp_line(const CountPlane& source, const LineRow& row, size_t r, int16_t* out) {
-    const D16 d;
-    const V16 steps = hn::Iota(d, 0), low = hn::Set(d, (1 << line_log2) - 1);
-    const auto along = [&](int32_t slope) HWY_ATTR {
-        return hn::ShiftRight<slope_log2 - line_log2>(hn::Mul(steps, hn::Set(d, int16_t(slope))));
-    };
-    const V16 x = hn::Add(hn::Add(hn::Set(d, int16_t(row.x[r])), hn::ShiftLeft<line_log2>(steps)), along(row.dx[r]));
-    const V16 y = hn::Add(hn::Set(d, int16_t(row.y[r])), along(row.dy[r]));
-    const V16 column = hn::ShiftRight<line_log2>(x);
-    eight<precision>(source,
-                     {row.base_x[r], row.base_y[r], column, hn::Add(column, hn::Set(d, 1)),
-                      hn::ShiftRight<line_log2>(y), hn::ShiftLeft<one_log2 - line_log2>(hn::And(x, low)),
-                      hn::ShiftLeft<one_log2 - line_log2>(hn::And(y, low)), hn::Zero(d)},
-                     out);
+// Counts of one source row: under a pixel, and right of it.
+struct SlippedTaps {
+    RunVector left, right;
+};
+
+HWY_INLINE SlippedTaps slipped_taps(RunPointers at, RunMask slips) {
+    const RunVector first = load_runs(at, 0), second = load_runs(at, 1), third = load_runs(at, 2);
+    return {hn::IfThenElse(slips, second, first), hn::IfThenElse(slips, third, second)};
 }
+
+template <int precision>
+HWY_INLINE RunVector across(SlippedTaps row, RunVector weight) {
+    const RunVector left = hn::ShiftLeft<precision>(row.left), right = hn::ShiftLeft<precision>(row.right);
+    return hn::Add(left, hn::MulFixedPoint15(hn::Sub(right, left), weight));
+}
+
+// A neighbour without weight may be masked.
+HWY_INLINE RunVector without_masked(RunVector value, SlippedTaps top, SlippedTaps bottom, RunVector fx, RunVector fy) {
+    const Runs d;
+    const RunMask whole_x = hn::Eq(fx, hn::Zero(d)), whole_y = hn::Eq(fy, hn::Zero(d));
+    const auto least_of = [&](SlippedTaps row)
+                              HWY_ATTR { return hn::Min(row.left, hn::IfThenElse(whole_x, row.left, row.right)); };
+    const RunVector upper = least_of(top), lower = hn::IfThenElse(whole_y, upper, least_of(bottom));
+    const RunVector none = hn::Set(d, masked);
+    return hn::IfThenElse(hn::Eq(hn::Min(upper, lower), none), none, value);
+}
+
+// Runs r and, in the second block, r + 1 by the counts at `second_run`: r + 1, or r where r + 1 does not fit, which leaves in
+// that block what is of no use. r and second_run fit.
+template <int precision>
+HWY_INLINE void warp_lines(const CountPlane& source, const LineRow& row, size_t r, size_t second_run, int16_t* out) {
+    const Runs d;
+    const hn::Repartition<uint8_t, Runs> d8;
+    // The same of a run's four numbers in all lanes of its block.
+    const auto start = hn::LoadDup128(d, &row.start[4 * r]);
+    const RunVector block = hn::IfThenElse(hn::FirstN(d, at_once), hn::Zero(d), hn::Set(d, 0x0808));
+    const auto number = [&](int16_t which) HWY_ATTR {
+        const RunVector bytes = hn::Add(block, hn::Set(d, int16_t(which * 0x0202 + 0x0100)));
+        return hn::BitCast(d, hn::TableLookupBytes(hn::BitCast(d8, start), hn::BitCast(d8, bytes)));
+    };
+    const RunVector steps = hn::And(hn::Iota(d, 0), hn::Set(d, at_once - 1));
+    const RunVector x = hn::Add(number(0), hn::Mul(steps, number(1))),
+                    y = hn::Add(number(2), hn::Mul(steps, number(3)));
+    const RunVector before_slip = hn::Set(d, line_one - 1), weights = hn::Set(d, (1 << one_log2) - 1);
+    const RunVector fx = hn::And(hn::ShiftLeft<one_log2 - line_log2>(x), weights);
+    const RunVector fy = hn::And(hn::ShiftLeft<one_log2 - line_log2>(y), weights);
+    const RunMask slips_x = hn::Gt(x, before_slip), slips_y = hn::Gt(y, before_slip);
+
+    const int16_t* const first = source.counts + row.offset[r];
+    const int16_t* const second = source.counts + row.offset[second_run];
+    const size_t pitch = source.pitch;
+    SlippedTaps top = slipped_taps({first, second}, slips_x);
+    SlippedTaps bottom = slipped_taps({first + pitch, second + pitch}, slips_x);
+    if (!hn::AllFalse(d, slips_y)) {
+        const size_t first_rows = size_t(row.rows[r]), second_rows = size_t(row.rows[second_run]);
+        const SlippedTaps third = slipped_taps({first + first_rows * pitch, second + second_rows * pitch}, slips_x);
+        top = {hn::IfThenElse(slips_y, bottom.left, top.left), hn::IfThenElse(slips_y, bottom.right, top.right)};
+        bottom = {hn::IfThenElse(slips_y, third.left, bottom.left), hn::IfThenElse(slips_y, third.right, bottom.right)};
+    }
+    const RunVector upper = across<precision>(top, fx), lower = across<precision>(bottom, fx);
+    RunVector value = hn::Add(upper, hn::MulFixedPoint15(hn::Sub(lower, upper), fy));
+    if constexpr (precision > 0) value = hn::ShiftRight<precision>(hn::Add(value, hn::Set(d, 1 << precision >> 1)));
+    const RunVector least = hn::Min(hn::Min(top.left, top.right), hn::Min(bottom.left, bottom.right));
+    if (!hn::AllFalse(d, hn::Eq(least, hn::Set(d, masked)))) value = without_masked(value, top, bottom, fx, fy);
+    hn::StoreU(value, d, out);
+}
+
+#endif
 
 template <int precision>
 void warp_rows(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range, int16_t* out,
                size_t out_pitch) {
-    const int width = motion.width(), runs = motion.runs();
-    LineRow row(runs);
+    LineRow row(motion.runs());
+    const int whole_runs = source.width / at_once;  // the last one of other widths overlaps that before
     for (int y = range.first; y < range.first + range.count; ++y) {
         int16_t* const to = out + size_t(y - range.first) * out_pitch;
         find_lines(source, motion, fraction, y, row);
-        for (int r = 0; r < runs; ++r) {
-            if (row.fits[size_t(r)])
-                warp_line<precision>(source, row, size_t(r), to + r * at_once);
-            else
-                warp_pixels<precision>(source, motion, fraction, r * at_once, y, to + r * at_once);
+        if (row.is_still) {
+            std::copy_n(source.counts + size_t(y) * source.pitch, source.width, to);
+            continue;
         }
-        // The last eight overlap those before.
-        if (width % at_once) warp_pixels<precision>(source, motion, fraction, width - at_once, y, to + width - at_once);
+        for (int r = 0; r < motion.runs(); ++r) {
+            const size_t run = size_t(r);
+            if (!row.rows[run]) {
+                warp_run<precision>(source, motion, r, y, fraction, to + motion.first_of(r));
+            } else if (runs_at_once == 2 && r + 1 < whole_runs && row.rows[run + 1]) {
+                warp_lines<precision>(source, row, run, run + 1, to + r * at_once);
+                ++r;
+            } else {
+                int16_t counts[runs_at_once * at_once];
+                warp_lines<precision>(source, row, run, run, counts);
+                std::copy_n(counts, at_once, to + motion.first_of(r));
+            }
+        }
     }
-}
-
-#endif  // HWY_TARGET != HWY_SCALAR
-
-// Planes too narrow for the table, and processors without one.
-void warp_narrow(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
-                 int precision, int16_t* out, size_t out_pitch) {
-    const FlowField &base = motion.base(), &step = motion.step();
-    const auto part = [](float coordinate, int size, int16_t& whole, int16_t& weight) {
-        const float held = std::min(std::max(coordinate, 0.0f), float(size - 1));
-        whole = int16_t(held);
-        weight = int16_t(std::min(std::nearbyint((held - float(whole)) * float(1 << one_log2)), 32767.0f));
-        return held != coordinate;
-    };
-    Sources s;
-    for (int y = range.first; y < range.first + range.count; ++y)
-        for (int x = 0; x < base.width; ++x) {
-            const size_t at = size_t(y) * size_t(base.width) + size_t(x);
-            const bool out_x = part(float(x) + (base.u[at] + fraction * step.u[at]), source.width, s.x[0], s.fx[0]);
-            const bool out_y = part(float(y) + (base.v[at] + fraction * step.v[at]), source.height, s.y[0], s.fy[0]);
-            s.outside[0] = out_x || out_y ? -1 : 0;
-            out[size_t(y - range.first) * out_pitch + size_t(x)] = pixel(source, s, 0, precision);
-        }
 }
 
 void warp_range(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                 int16_t* out, size_t out_pitch) {
     constexpr int fine_largest = 4095, fine_bits = 2;
-    const bool is_fine = source.largest <= fine_largest;
-#if HWY_TARGET != HWY_SCALAR
-    if (source.width >= table_pixels)
-        return is_fine ? warp_rows<fine_bits>(source, motion, fraction, range, out, out_pitch)
-                       : warp_rows<0>(source, motion, fraction, range, out, out_pitch);
-#endif
-    warp_narrow(source, motion, fraction, range, is_fine ? fine_bits : 0, out, out_pitch);
+    if (source.largest <= fine_largest)
+        warp_rows<fine_bits>(source, motion, fraction, range, out, out_pitch);
+    else
+        warp_rows<0>(source, motion, fraction, range, out, out_pitch);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -319,66 +409,6 @@ HWY_AFTER_NAMESPACE();
 namespace ols {
 
 HWY_EXPORT(warp_range);
-
-FlowField seen_from_target(const FlowField& base, const FlowField& local) {
-    FlowField seen = concatenated(base, local);
-    for (size_t p = 0; p < seen.size(); ++p) seen.u[p] -= base.u[p], seen.v[p] -= base.v[p];
-    return seen;
-}
-
-FlowField of_color_plane(const FlowField& flow, int first_x, int first_y) {
-    FlowField out((flow.width - first_x + 1) / 2, (flow.height - first_y + 1) / 2);
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x) {
-            const size_t from = size_t(2 * y + first_y) * size_t(flow.width) + size_t(2 * x + first_x);
-            const size_t to = size_t(y) * size_t(out.width) + size_t(x);
-            out.u[to] = flow.u[from] / 2;
-            out.v[to] = flow.v[from] / 2;
-        }
-    return out;
-}
-
-GroupMotion::GroupMotion(FlowField base, FlowField step, float tolerance_px)
-    : base_(std::move(base)), step_(std::move(step)) {
-    assert(base_.width == step_.width && base_.height == step_.height);
-    const size_t count = size_t(runs()) * size_t(height());
-    // Vectors read whole registers.
-    for (auto* list : {&lines_.base_u, &lines_.base_du, &lines_.base_v, &lines_.base_dv, &lines_.step_u,
-                       &lines_.step_du, &lines_.step_v, &lines_.step_dv})
-        list->assign(count + 16, std::numeric_limits<float>::quiet_NaN());
-    // The line through the first and the last pixel; whether the others are near it.
-    const auto fit = [&](const float* v, float& first, float& change) {
-        first = v[0];
-        change = (v[run_pixels - 1] - v[0]) / float(run_pixels - 1);
-        float worst = 0;
-        for (int k = 1; k < run_pixels - 1; ++k) worst = std::max(worst, std::abs(v[0] + float(k) * change - v[k]));
-        return worst <= tolerance_px / 2;  // base and step share the tolerance
-    };
-    for (size_t run = 0; run < count; ++run) {
-        const size_t at = run / size_t(runs()) * size_t(width()) + run % size_t(runs()) * run_pixels;
-        bool ok = tolerance_px > 0;
-        ok &= fit(&base_.u[at], lines_.base_u[run], lines_.base_du[run]);
-        ok &= fit(&base_.v[at], lines_.base_v[run], lines_.base_dv[run]);
-        ok &= fit(&step_.u[at], lines_.step_u[run], lines_.step_du[run]);
-        ok &= fit(&step_.v[at], lines_.step_v[run], lines_.step_dv[run]);
-        if (!ok) lines_.base_u[run] = std::numeric_limits<float>::quiet_NaN();
-    }
-}
-
-void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) const {
-    const size_t from = size_t(y) * size_t(width());
-    for (int x = 0; x < width(); ++x) {
-        x_out[x] = float(x) + (base_.u[from + size_t(x)] + fraction * step_.u[from + size_t(x)]);
-        y_out[x] = float(y) + (base_.v[from + size_t(x)] + fraction * step_.v[from + size_t(x)]);
-    }
-}
-
-double GroupMotion::linear_share() const {
-    const size_t count = size_t(runs()) * size_t(height());
-    size_t linear = 0;
-    for (size_t run = 0; run < count; ++run) linear += !std::isnan(lines_.base_u[run]);
-    return count ? double(linear) / double(count) : 0;
-}
 
 void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                  int16_t* out, size_t out_pitch) {
