@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "sim_scenes.hpp"
@@ -109,6 +110,28 @@ TEST_F(Slots, do_not_depend_on_threads_or_on_what_was_rendered_before) {
     ASSERT_TRUE(render_slots(renderer, setup, sequence_, 7));
     const auto later = render_slots(renderer, setup, sequence_, 1);
     for (const size_t s : {0, 2, 3}) EXPECT_EQ(fresh[s]->samples, (*later)[s]->samples);
+}
+
+// The third slot lights lamps 1 and 2 for the 156 us that its light and its late trigger share.
+TEST_F(Slots, without_noise_count_the_sum_of_their_lamps_frozen_at_their_time) {
+    stage_.cameras[0].vignetting = 0.25;
+    const ols::Setup setup{scene_, stage_, stage_.cameras[0], true};
+    Renderer renderer(setup, {"noise"});
+    const auto frames = render_slots(renderer, setup, sequence_, 1);
+    const auto lamps = render_lamps(setup, 19500 * 0.008, slot_time_us(sequence_, setup.camera, 1, 2));
+    const auto moved = render_lamps(setup, 19500 * 0.008, slot_time_us(sequence_, setup.camera, 0, 2));
+    ASSERT_EQ(lamps.size(), 3u);
+    const Frame& frame = *(*frames)[2];
+    const auto* counts = reinterpret_cast<const uint16_t*>(frame.samples.data());
+    int subject = 0, differing = 0;
+    for (size_t i = 0; i < lamps[0].data.size(); ++i) {
+        const float sum = lamps[1].data[i] + lamps[2].data[i];
+        ASSERT_NEAR(counts[i] - frame.black, sum, 0.51) << i;
+        subject += sum > 20;
+        differing += std::abs(moved[1].data[i] + moved[2].data[i] - sum) > 2;
+    }
+    EXPECT_GT(subject, 30);
+    EXPECT_GT(differing, 10);
 }
 
 TEST_F(Slots, of_grey_levels_are_an_error_that_names_the_slot) {

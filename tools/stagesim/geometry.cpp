@@ -134,6 +134,12 @@ bool Geometry::place(double time_us) {
     return moved;
 }
 
+std::array<Float3, 2> Geometry::bounds() const {
+    RTCBounds box;
+    rtcGetSceneBounds(state_->embree, &box);
+    return {Float3{box.lower_x, box.lower_y, box.lower_z}, Float3{box.upper_x, box.upper_y, box.upper_z}};
+}
+
 Float3 Geometry::position_of(const SurfaceHit& hit) const {
     const Object& object = state_->scene->objects[hit.object];
     const Placed& now = state_->placed[hit.object];

@@ -47,6 +47,9 @@ class Geometry {
     // The nearest surface that a ray from `origin` along `direction` meets.
     std::optional<SurfaceHit> intersect(Float3 origin, Float3 direction) const;
 
+    // A box around everything, now: its least and greatest corner.
+    std::array<Float3, 2> bounds() const;
+
     // Where the surface point that a hit met, perhaps at another time, is now.
     Float3 position_of(const SurfaceHit& hit) const;
 

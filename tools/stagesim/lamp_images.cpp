@@ -28,6 +28,11 @@ void start(LightPacket& packet, bool sphere_lights_board) {
     }
 }
 
+bool is_dark(const LightPacket& packet) {
+    return std::all_of(&packet.reflected[0][0], &packet.reflected[0][0] + 3 * packet_size,
+                       [](float r) { return r == 0; });
+}
+
 }  // namespace
 
 LampImages::LampImages(VisiblePoints points, size_t lamps, int channels)
@@ -66,11 +71,13 @@ void LampImages::render_chunk(const VisiblePoints::Chunk& chunk, const std::vect
                     packet.reflected[c][i] = points_.albedo[c][packet.first + i] * packet.irradiance[i];
         for (size_t e = 0; e < reflecting.size(); ++e) reflecting[e] += effects.reflecting()[e]->apply(packets);
         std::fill(colors.begin(), colors.end(), 0.0f);
-        for (const LightPacket& packet : packets)
+        for (const LightPacket& packet : packets) {
+            if (is_dark(packet)) continue;
             for (int i = 0; i < packet_size; ++i)
                 for (int c = 0; c < 3; ++c)
                     colors[(points_.pixel[packet.first + i] - chunk.first_pixel) * 3 + c] +=
                         points_.weight[packet.first + i] * packet.reflected[c][i];
+        }
         float* image = images_[lamp].data() + size_t(chunk.first_pixel) * channels_;
         if (channels_ == 3) {
             std::copy(colors.begin(), colors.end(), image);

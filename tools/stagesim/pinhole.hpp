@@ -19,6 +19,12 @@ class Pinhole {
     Float3 ray(double x, double y) const;
     // The image point of a place before the camera.
     std::array<double, 2> project(Float3 place) const;
+    // The pixels, from the first to one past the last in both directions, out of width x height, in which a place of the box
+    // between two corners may be seen.
+    struct Pixels {
+        int left, top, right, bottom;
+    };
+    Pixels cover(const std::array<Float3, 2>& box, int width, int height) const;
     // Radians, in the middle of the image.
     float pixel_angle() const { return float(length(right_)); }
 

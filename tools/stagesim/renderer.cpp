@@ -23,7 +23,9 @@ class Stopwatch {
 }  // namespace
 
 Renderer::Renderer(const Setup& setup, const std::set<std::string>& disabled)
-    : setup_(setup), effects_(setup, disabled), lamps_(place_lamps(setup.stage, setup.scene)) {}
+    : setup_(setup), effects_(setup, disabled), lamps_(place_lamps(setup.stage, setup.scene)) {
+    if (setup.scene.texture_step_m > 0) baked_ = std::make_unique<BakedLooks>(setup.scene, setup.scene.texture_step_m);
+}
 
 void Renderer::place(double time_us) {
     // Nobody moves, or motion is disabled: the scene stays as it is at time 0.
@@ -39,7 +41,8 @@ void Renderer::place(double time_us) {
     sums_.forget();
     const Stopwatch stopwatch(cost_.visibility_s);
     const CameraConfig& camera = setup_.camera;
-    VisiblePoints points = find_visible_points(setup_.scene, *geometry_, Pinhole(camera), camera.width, camera.height);
+    VisiblePoints points =
+        find_visible_points(setup_.scene, *geometry_, Pinhole(camera), camera.width, camera.height, baked_.get());
     ++cost_.placings;
     cost_.primary_rays += uint64_t(camera.width) * camera.height * setup_.scene.samples;
     cost_.visible_points = points.size();

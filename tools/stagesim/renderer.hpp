@@ -49,6 +49,7 @@ class Renderer {
     EffectSet effects_;
     std::vector<PlacedLamp> lamps_;
     std::unique_ptr<Geometry> geometry_;
+    std::unique_ptr<BakedLooks> baked_;   // where the scene asks for it
     std::unique_ptr<LampImages> images_;  // of the geometry as it is placed
     LightSums sums_{size_t(768) << 20};   // a cycle of 180 pictures of 640 x 480 in colour
     Cost cost_;

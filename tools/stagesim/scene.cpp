@@ -212,6 +212,7 @@ Result<Scene> read_scene(const std::string& path) {
     const int side = int(std::lround(std::sqrt(scene.samples)));
     if (side * side != scene.samples) file->reject("samples", "must be a square number: 1, 4, 9, 16, ...");
     file->read("merge_samples", scene.merges_samples);
+    scene.texture_step_m = float(read_number(*file, "texture_step_mm", 0, 0, 1000) * 1e-3);
     file->read("shadow_step_px", scene.shadow_step_px, 1, 5);
     if (scene.shadow_step_px % 2 == 0) file->reject("shadow_step_px", "must be 1 (exact), 3 or 5");
     scene.seed = uint64_t(read_number(*file, "seed", 1, 0, 9e15));

@@ -76,10 +76,12 @@ struct Scene {
     std::vector<Object> objects;  // the board, if there is one, is the last
     std::optional<Board> board;
     int samples = 4;  // primary samples a pixel, a square number
-    // Knobs for speed, approximations both: samples of a pixel that meet one smooth surface are shaded as one, and
-    // shadows are found on a lattice of pixels (effects/shadows.hpp).
+    // Knobs for speed, approximations all: samples of a pixel that meet one smooth surface are shaded as one, and
+    // shadows are found on a lattice of pixels (effects/shadows.hpp), and looks of meshes on a lattice of their triangles
+    // (baked_looks.hpp; 0: exact).
     bool merges_samples = false;
     int shadow_step_px = 1;
+    float texture_step_m = 0;
     uint64_t seed = 1;  // of the cameras' noise
     CameraClock clock;
 };

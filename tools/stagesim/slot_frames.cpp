@@ -79,4 +79,15 @@ Result<std::vector<std::shared_ptr<const Frame>>> render_slots(Renderer& rendere
     return frames;
 }
 
+std::vector<Image> render_lamps(const Setup& setup, double exposure_us, double time_us) {
+    Renderer renderer(setup, {"noise", "quantisation"});
+    std::vector<Image> lamps;
+    for (size_t lamp = 0; lamp < renderer.lamp_count(); ++lamp) {
+        std::vector<double> lit_us(renderer.lamp_count(), 0);
+        lit_us[lamp] = exposure_us;
+        lamps.push_back(renderer.expose(lit_us, time_us, 0, 0).counts);
+    }
+    return lamps;
+}
+
 }  // namespace ols

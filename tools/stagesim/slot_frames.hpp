@@ -22,4 +22,9 @@ double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32
 Result<std::vector<std::shared_ptr<const Frame>>> render_slots(Renderer& renderer, const Setup& setup,
                                                                const Sequence& sequence, uint32_t cycle);
 
+// The scene frozen at `time_us` under each lamp of the stage alone, lit for `exposure_us`: what a camera without noise counts
+// above black, with its gain, vignetting and colour filter (one channel; three without a mosaic), unrounded and without
+// saturation. What a slot of these lamps should count, were the subject still, is their sum.
+std::vector<Image> render_lamps(const Setup& setup, double exposure_us, double time_us);
+
 }  // namespace ols

@@ -22,15 +22,14 @@ float relief(Float3 p) {
            0.45e-4f * smoothstep(0.45f, 0.0f, speckle3(p * 850, 12, 0.45f).distance);
 }
 
-Float3 with_relief(Float3 normal, Float3 p, float strength) {
+Float3 slope_of_relief(Float3 p) {
     constexpr float step = 2e-4f;
     const float here = relief(p);
-    const Float3 slope{(relief(p + Float3{step, 0, 0}) - here) / step, (relief(p + Float3{0, step, 0}) - here) / step,
-                       (relief(p + Float3{0, 0, step}) - here) / step};
-    return normalized(normal - (slope - normal * dot(slope, normal)) * strength);
+    return {(relief(p + Float3{step, 0, 0}) - here) / step, (relief(p + Float3{0, step, 0}) - here) / step,
+            (relief(p + Float3{0, 0, step}) - here) / step};
 }
 
-Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
+Look skin(const Material& material, Float3 p, Float3 mask) {
     const float lips = mask.x, hair = mask.y, flush = mask.z;
     // Melanin and blood vary at several scales; redness follows the flush mask and its own blotches.
     const float tone = fractal_noise3(p * 38, 5, 0.55f, 1);
@@ -59,24 +58,24 @@ Look skin(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     const float oil = std::clamp(0.5f * flush + 0.4f * fractal_noise3(p * 25, 2, 0.5f, 7), -0.3f, 0.5f);
     look.roughness = std::clamp(material.roughness * (1 - 0.25f * oil - 0.30f * lips + 0.25f * hair), 0.05f, 1.0f);
     look.f0 = material.f0 * (1 - 0.5f * cover);
-    look.normal = with_relief(normal, p, 1 - 0.4f * lips);
+    look.slope = slope_of_relief(p) * (1 - 0.4f * lips);
     return look;
 }
 
 // Combed hair: locks of some 6 mm, strands of 1.5 mm and of half that, all along y and a little wavy.
-Look hair(const Material& material, Float3 p, Float3 normal) {
+Look hair(const Material& material, Float3 p) {
     const float wave = 0.003f * noise3(p * 35, 31);
     const auto across = [&](float per_m, uint32_t seed) {
         return noise3({(p.x + wave) * per_m, p.y * per_m * 0.04f, p.z * per_m}, seed);
     };
     const float shade = 1 + 0.35f * across(160, 32) + 0.75f * across(660, 33) + 0.45f * across(1300, 34);
-    return {material.albedo * std::max(0.08f, shade), material.roughness, material.f0, normal};
+    return {material.albedo * std::max(0.08f, shade), material.roughness, material.f0, {}};
 }
 
 // Angles from the eye's axis over pi; the head.py of assets puts the limbus where the cornea meets the globe, asin(1/2).
 constexpr float limbus_angle = 1.0f / 6, pupil_angle = 0.055f;
 
-Look eye(const Material& material, Float3 p, Float3 normal, Float3 mask) {
+Look eye(const Material& material, Float3 p, Float3 mask) {
     const float angle = mask.x;
     const float veins = std::max(0.0f, fractal_noise3(p * 700, 3, 0.6f, 21) - 0.15f);
     const Float3 sclera =
@@ -89,19 +88,24 @@ Look eye(const Material& material, Float3 p, Float3 normal, Float3 mask) {
     const float ring = 1 - smoothstep(0.0f, 0.016f, std::abs(angle - limbus_angle));
     albedo = albedo * (1 - 0.6f * ring);
     albedo = mix({0.004f, 0.004f, 0.004f}, albedo, smoothstep(pupil_angle - 0.006f, pupil_angle + 0.004f, angle));
-    return {albedo, material.roughness, material.f0, normal};
+    return {albedo, material.roughness, material.f0, {}};
 }
 
 }  // namespace
 
-Look look_of(const Material& material, Float3 position, Float3 normal, Float3 mask) {
+Look look_of(const Material& material, Float3 position, Float3 mask) {
     switch (material.type) {
-        case MaterialType::skin: return skin(material, position, normal, mask);
-        case MaterialType::eye: return eye(material, position, normal, mask);
-        case MaterialType::hair: return hair(material, position, normal);
+        case MaterialType::skin: return skin(material, position, mask);
+        case MaterialType::eye: return eye(material, position, mask);
+        case MaterialType::hair: return hair(material, position);
         case MaterialType::diffuse: break;
     }
-    return {material.albedo, material.roughness, material.f0, normal};
+    return {material.albedo, material.roughness, material.f0, {}};
+}
+
+Float3 relieved(Float3 normal, Float3 slope) {
+    if (slope == Float3{}) return normal;
+    return normalized(normal - (slope - normal * dot(slope, normal)));
 }
 
 }  // namespace ols

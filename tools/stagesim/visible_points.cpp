@@ -25,12 +25,12 @@ struct Point {
     int samples = 1;  // whose mean it is
 };
 
-Point make_point(const Scene& scene, const SurfaceHit& hit, Float3 ray) {
+Point make_point(const Scene& scene, const SurfaceHit& hit, Float3 ray, BakedLooks* baked) {
     Point point;
     point.position = hit.position;
     point.view = ray * -1.0f;
-    point.look = look_of(scene.materials[hit.material], hit.rest_position, hit.rest_normal, hit.mask);
-    point.normal = hit.pose.turn(point.look.normal);
+    point.look = baked ? baked->at(hit) : look_of(scene.materials[hit.material], hit.rest_position, hit.mask);
+    point.normal = hit.pose.turn(relieved(hit.rest_normal, point.look.slope));
     point.smooth = hit.normal;
     point.object = hit.object, point.material = hit.material;
     return point;
@@ -78,8 +78,18 @@ struct Tile {
     std::vector<uint32_t> pixels;
 };
 
+// What is looked at.
+struct View {
+    const Scene& scene;
+    const Geometry& geometry;
+    const Pinhole& camera;
+    BakedLooks* baked;        // null: looks are exact
+    Pinhole::Pixels covered;  // no ray through another pixel meets anything
+};
+
 // The points of a pixel; `x`, `y` is its top left corner.
-std::vector<Point> trace_pixel(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int x, int y) {
+std::vector<Point> trace_pixel(const View& view, int x, int y) {
+    const auto& [scene, geometry, camera, baked, covered] = view;
     const int side = int(std::lround(std::sqrt(scene.samples)));
     std::vector<Point> points;
     // A pixel's own width, and more for a surface that tilts away.
@@ -88,7 +98,7 @@ std::vector<Point> trace_pixel(const Scene& scene, const Geometry& geometry, con
         const Float3 ray = camera.ray(x + (s % side + 0.5) / side, y + (s / side + 0.5) / side);
         const auto hit = geometry.intersect(camera.position(), ray);
         if (!hit) continue;
-        Point point = make_point(scene, *hit, ray);
+        Point point = make_point(scene, *hit, ray, baked);
         point.weight = 1.0f / float(scene.samples);
         const auto merged = [&](Point& p) { return merge(p, point, reach_m(hit->position)); };
         if (scene.merges_samples && std::any_of(points.begin(), points.end(), merged)) continue;
@@ -99,12 +109,12 @@ std::vector<Point> trace_pixel(const Scene& scene, const Geometry& geometry, con
     return points;
 }
 
-Tile trace_tile(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int width, int height, int tile_x,
-                int tile_y) {
+Tile trace_tile(const View& view, int width, int tile_x, int tile_y) {
+    const Pinhole::Pixels& covered = view.covered;
     Tile tile;
-    for (int y = tile_y; y < std::min(tile_y + tile_pixels, height); ++y)
-        for (int x = tile_x; x < std::min(tile_x + tile_pixels, width); ++x) {
-            for (Point& point : trace_pixel(scene, geometry, camera, x, y)) {
+    for (int y = std::max(tile_y, covered.top); y < std::min(tile_y + tile_pixels, covered.bottom); ++y)
+        for (int x = std::max(tile_x, covered.left); x < std::min(tile_x + tile_pixels, covered.right); ++x) {
+            for (Point& point : trace_pixel(view, x, y)) {
                 point.pixel = uint32_t(tile.pixels.size());
                 tile.points.push_back(point);
             }
@@ -145,12 +155,12 @@ void append(VisiblePoints& all, const Tile& tile, const Scene& scene) {
 }  // namespace
 
 VisiblePoints find_visible_points(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int width,
-                                  int height) {
+                                  int height, BakedLooks* baked) {
+    const View view{scene, geometry, camera, baked, camera.cover(geometry.bounds(), width, height)};
     const int across = (width + tile_pixels - 1) / tile_pixels, down = (height + tile_pixels - 1) / tile_pixels;
     std::vector<Tile> tiles(size_t(across) * down);
     tbb::parallel_for(0, across * down, [&](int i) {
-        tiles[i] =
-            trace_tile(scene, geometry, camera, width, height, i % across * tile_pixels, i / across * tile_pixels);
+        tiles[i] = trace_tile(view, width, i % across * tile_pixels, i / across * tile_pixels);
     });
     VisiblePoints all;
     all.width = width, all.height = height, all.samples = scene.samples;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "baked_looks.hpp"
 #include "geometry.hpp"
 #include "pinhole.hpp"
 
@@ -34,9 +35,9 @@ struct VisiblePoints {
 };
 
 // Casts the scene's samples (a square number, at the middles of a fixed grid) through every pixel. With
-// scene.merges_samples, those of a pixel that meet one smooth surface become one point, their mean. The same for any
-// number of threads.
+// scene.merges_samples, those of a pixel that meet one smooth surface become one point, their mean. With `baked` (else null), looks
+// come from there. The same for any number of threads.
 VisiblePoints find_visible_points(const Scene& scene, const Geometry& geometry, const Pinhole& camera, int width,
-                                  int height);
+                                  int height, BakedLooks* baked);
 
 }  // namespace ols
