@@ -29,16 +29,6 @@ double middle_tick(const Frame& frame) {
     return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
 }
 
-// The target's instant: its tracking frame's, or where that was lost, what the nearest tracking frame says of it.
-double instant_of(const TargetFrames& frames, const Sequence& sequence) {
-    const auto away = [&](const TargetFrames::Tracking& one) {
-        return std::abs(double(one.number) - double(frames.basis.target));
-    };
-    const auto nearest = std::ranges::min_element(frames.tracking, {}, away);
-    return middle_tick(*nearest->frame) +
-           (double(frames.basis.target) - double(nearest->number)) * double(sequence.slots.front().period_ticks);
-}
-
 }  // namespace
 
 MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration,
@@ -55,6 +45,15 @@ MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibrati
       }()) {}
 
 MotionDeveloper::~MotionDeveloper() = default;
+
+double MotionDeveloper::instant_of(const TargetFrames& frames, const Sequence& sequence) {
+    const auto away = [&](const TargetFrames::Tracking& one) {
+        return std::abs(double(one.number) - double(frames.basis.target));
+    };
+    const auto nearest = std::ranges::min_element(frames.tracking, {}, away);
+    return middle_tick(*nearest->frame) +
+           (double(frames.basis.target) - double(nearest->number)) * double(sequence.slots.front().period_ticks);
+}
 
 Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
     const Stopwatch watch(times_.flow);
@@ -110,14 +109,12 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std:
     return aligned;
 }
 
-Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames) {
-    auto path = find_path(frames);
-    if (!path.ok()) return path.error();
+Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames, const MotionPath& path) {
     const Frame& like = *frames.frames.front();
     std::shared_ptr<const Alignment> alignment;
     {
         const Stopwatch watch(times_.flow);
-        alignment = std::make_shared<Alignment>(*path, int(like.width), int(like.height), like.cfa,
+        alignment = std::make_shared<Alignment>(path, int(like.width), int(like.height), like.cfa,
                                                 quality_.line_tolerance_px, options_.threads);
     }
     AlignedFrames aligned;
@@ -131,7 +128,7 @@ Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames) {
     return aligned;
 }
 
-Result<Target> MotionDeveloper::develop(const TargetFrames& frames) {
+Result<Target> MotionDeveloper::develop(const TargetFrames& frames, const MotionPath* path) {
     if (frames.frames.empty()) return fail("every basis slot around the target is missing");
     if (!quality_.compensates) {
         RowFrames rows(size_t(sequence_.basis.rows));
@@ -140,7 +137,13 @@ Result<Target> MotionDeveloper::develop(const TargetFrames& frames) {
         const Stopwatch watch(times_.invert);
         return developer_.develop(rows, frames.basis.lost);
     }
-    auto aligned = align(frames);
+    std::optional<MotionPath> found;
+    if (!path) {
+        auto searched = find_path(frames);
+        if (!searched.ok()) return searched.error();
+        found = std::move(*searched);
+    }
+    auto aligned = align(frames, path ? *path : *found);
     if (!aligned.ok()) return aligned.error();
     const Stopwatch watch(times_.invert);
     return developer_.develop(*aligned, frames.basis.lost);

@@ -37,7 +37,8 @@ class MotionDeveloper {
 
     // Errors: those of Developer::develop, and frames too small for flow. Where no tracking frame is near, nothing moves
     // and every pixel is masked (mask_misaligned).
-    Result<Target> develop(const TargetFrames& frames);
+    // `path`, if given, takes the place of the flow that would be found: a true one, to measure what flow errs.
+    Result<Target> develop(const TargetFrames& frames, const MotionPath* path = nullptr);
 
     // Where the time went, of all targets so far, in seconds of the calling thread.
     struct Times {
@@ -47,6 +48,9 @@ class MotionDeveloper {
     };
     const Times& times() const { return times_; }
 
+    // The middle of the target's tracking exposure, in ticks; where that frame was lost, by its neighbours' word.
+    static double instant_of(const TargetFrames& frames, const Sequence& sequence);
+
   private:
     template <typename Sample>
     using PlanesByNumber = std::map<uint64_t, std::shared_ptr<const ColorPlanes<Sample>>>;
@@ -55,7 +59,7 @@ class MotionDeveloper {
     template <typename Sample, typename Sum>
     AlignedRows<Sample, Sum> align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
                                    PlanesByNumber<Sample>& known);
-    Result<AlignedFrames> align(const TargetFrames& frames);
+    Result<AlignedFrames> align(const TargetFrames& frames, const MotionPath& path);
 
     const Sequence& sequence_;
     const CameraCalibration& calibration_;
