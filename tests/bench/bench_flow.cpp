@@ -115,9 +115,10 @@ int main(int argc, char** argv) {
                   "served to tune a method. The error is the mean endpoint error over what both frames show, the mean "
                   "of the "
                   "four scenes; the time is that of one flow of 640 x 480 on one core.",
-         .advice = "Take `brox`: half the error of DIS medium without noise, somewhat less with it, for about its time. "
-                   "`robust` errs least where there is little noise; `brox-quick` and `brox-half` are for preview, "
-                   "`refine` for a flow that is nearly right. docs/motion.md says what each is."});
+         .advice =
+             "Take `brox`: half the error of DIS medium without noise, somewhat less with it, for about its time. "
+             "`robust` errs least where there is little noise; `brox-quick` and `brox-half` are for preview, "
+             "`refine` for a flow that is nearly right. docs/motion.md says what each is."});
     const int width = bench.full() ? 640 : 96, height = bench.full() ? 480 : 64;
     const std::vector<FlowScene> clean = reported_scenes(width, height);
     std::vector<FlowScene> noise;
