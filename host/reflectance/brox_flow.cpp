@@ -299,14 +299,16 @@ FlowField solve_level(const FlowPair& pair, const FlowField& begin, const BroxFl
 }  // namespace
 
 FlowField brox_flow(const FlowPair& pair, const BroxFlowOptions& options, const FlowField* initial) {
-    const FlowPyramid pyramid = flow_pyramid(pair, options.ratio, options.coarsest, options.detail);
-    return coarse_to_fine(pyramid, options.finest_level, initial, [&](size_t level, const FlowField& begin) {
-        const double scale = double(begin.width) / pair.from.width;
-        const bool finest = level == size_t(options.finest_level), coarsest = level + 1 == pyramid.levels.size();
-        const int warps = finest     ? options.finest_warps
+    FlowLevels which{.ratio = options.ratio, .coarsest = options.coarsest, .finest = options.finest_level};
+    if (initial) which.octaves = options.initial_octaves;
+    const FlowPyramid pyramid = flow_pyramid(pair, which, options.detail);
+    return coarse_to_fine(pyramid, initial, [&](size_t level, const FlowField& begin) {
+        const bool coarsest = !initial && level + 1 == pyramid.levels.size();
+        const int warps = level == 0 ? options.finest_warps
                           : coarsest ? std::max(options.warps, least_coarsest_warps)
                                      : options.warps;
-        return solve_level(pyramid.levels[level], begin, options, initial, scale, finest, warps);
+        const double scale = double(begin.width) / pair.from.width;
+        return solve_level(pyramid.levels[level], begin, options, initial, scale, level == 0, warps);
     });
 }
 

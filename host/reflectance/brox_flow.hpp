@@ -27,13 +27,14 @@ struct BroxFlowOptions {
     FlowDetail detail = {};
     float gradient = 1;
     float smoothness = 0.8f;
-    double ratio = 0.5;    // of a pyramid level's sides to those of the level before; the paper has 0.95
-    int warps = 2;         // a level; the coarsest has at least six, as all motion is still to be found there
-    int finest_warps = 2;  // at the finest level, which costs as much as all others together
-    int reweightings = 2;  // a warp
-    int sweeps = 6;        // of red-black over-relaxation, a reweighting
-    int coarsest = 16;     // pixels: no pyramid level has a shorter side
-    int finest_level = 0;  // where the pyramid ends; the flow is enlarged from there
+    double ratio = 0.5;          // of a pyramid level's sides to those of the level before; the paper has 0.95
+    int warps = 2;               // a level; the coarsest has at least six, as all motion is still to be found there
+    int finest_warps = 2;        // at the finest level, which costs as much as all others together
+    int reweightings = 2;        // a warp
+    int sweeps = 6;              // of red-black over-relaxation, a reweighting
+    int coarsest = 16;           // pixels: no pyramid level has a shorter side
+    int finest_level = 0;        // where the pyramid ends; the flow is enlarged from there
+    double initial_octaves = 1;  // by which the level where a given flow is taken up is coarser than the finest
 
     std::vector<FlowHint> hints = {};
     float hint = 10;              // weight at the hint itself

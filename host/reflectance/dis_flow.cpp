@@ -32,19 +32,19 @@ void quantize(const FlowPair& pair, cv::Mat& from, cv::Mat& to) {
 }
 
 // OpenCV reads beside images that are only few patches wide: those get a border on the right and below.
-void enlarge(cv::Mat& image, int smallest) {
+cv::Mat enlarged(const cv::Mat& image, int smallest) {
     const int right = std::max(smallest - image.cols, 0), below = std::max(smallest - image.rows, 0);
-    if (right + below > 0) cv::copyMakeBorder(image, image, 0, below, 0, right, cv::BORDER_REPLICATE);
+    if (right + below == 0) return image;
+    cv::Mat out;
+    cv::copyMakeBorder(image, out, 0, below, 0, right, cv::BORDER_REPLICATE);
+    return out;
 }
 
-}  // namespace
-
-FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
-    cv::Mat from, to, vectors;
-    quantize(pair, from, to);
-    const int width = from.cols, height = from.rows;
+// By patches, from coarse to fine.
+FlowField searched(const cv::Mat& from_image, const cv::Mat& to_image, const DisFlowOptions& options,
+                   const FlowField* initial) {
+    const int width = from_image.cols, height = from_image.rows;
     const int smallest = 4 * options.patch_size << options.finest_scale;
-    for (cv::Mat* image : {&from, &to}) enlarge(*image, smallest);
     const cv::Ptr<cv::DISOpticalFlow> dis = cv::DISOpticalFlow::create(cv::DISOpticalFlow::PRESET_MEDIUM);
     dis->setFinestScale(options.finest_scale);
     dis->setPatchSize(options.patch_size);
@@ -54,28 +54,41 @@ FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const Fl
     dis->setVariationalRefinementAlpha(options.smoothness);
     dis->setVariationalRefinementDelta(options.brightness);
     dis->setVariationalRefinementGamma(options.gradient);
+    cv::Mat vectors;
     if (initial) {
         const std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, const_cast<float*>(initial->u.data())),
                                              cv::Mat(height, width, CV_32F, const_cast<float*>(initial->v.data()))};
         cv::merge(planes, vectors);
-        enlarge(vectors, smallest);
+        vectors = enlarged(vectors, smallest);
     }
-    dis->calc(from, to, vectors);
+    dis->calc(enlarged(from_image, smallest), enlarged(to_image, smallest), vectors);
     FlowField flow(width, height);
     std::vector<cv::Mat> planes = {cv::Mat(height, width, CV_32F, flow.u.data()),
                                    cv::Mat(height, width, CV_32F, flow.v.data())};
-    vectors = vectors(cv::Rect(0, 0, width, height));
-    from = from(cv::Rect(0, 0, width, height));
-    to = to(cv::Rect(0, 0, width, height));
-    cv::split(vectors, planes);
-    if (options.final_refinements > 0) {
-        const cv::Ptr<cv::VariationalRefinement> refinement = cv::VariationalRefinement::create();
-        refinement->setFixedPointIterations(options.final_refinements);
-        refinement->setAlpha(options.smoothness);
-        refinement->setDelta(options.brightness);
-        refinement->setGamma(options.gradient);
-        refinement->calcUV(from, to, planes[0], planes[1]);
-    }
+    cv::split(vectors(cv::Rect(0, 0, width, height)), planes);
+    return flow;
+}
+
+// Brox 2004 without a pyramid: finds what is left of about a pixel.
+void refine(const cv::Mat& from, const cv::Mat& to, const DisFlowOptions& options, FlowField& flow) {
+    const cv::Ptr<cv::VariationalRefinement> refinement = cv::VariationalRefinement::create();
+    refinement->setFixedPointIterations(options.final_refinements);
+    refinement->setAlpha(options.smoothness);
+    refinement->setDelta(options.brightness);
+    refinement->setGamma(options.gradient);
+    cv::Mat u(flow.height, flow.width, CV_32F, flow.u.data()), v(flow.height, flow.width, CV_32F, flow.v.data());
+    refinement->calcUV(from, to, u, v);
+}
+
+}  // namespace
+
+FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
+    cv::Mat from, to;
+    quantize(pair, from, to);
+    FlowField flow = options.search ? searched(from, to, options, initial)
+                     : initial      ? *initial
+                                    : FlowField(from.cols, from.rows);
+    if (options.final_refinements > 0) refine(from, to, options, flow);
     return flow;
 }
 

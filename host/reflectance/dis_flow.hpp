@@ -8,6 +8,7 @@
 namespace ols {
 
 struct DisFlowOptions {
+    bool search = true;     // false: only the final refinements, of the given flow (or zero)
     int finest_scale = 1;   // of the patches: 0 full resolution, 1 half, 2 a quarter; above 0 the flow is enlarged
     int patch_size = 8;     // pixels
     int patch_stride = 3;   // pixels from patch to patch
@@ -16,7 +17,7 @@ struct DisFlowOptions {
     float smoothness = 20;  // of the refinement, with the weights of constant brightness and constant gradient
     float brightness = 5;
     float gradient = 10;
-    int final_refinements = 0;  // fixed-point iterations more, at full resolution, after all
+    int final_refinements = 0;  // fixed-point iterations more, from the flow found, at full resolution
 };
 
 // Deterministic: the same bits for any thread count. Non-empty images of the same size.

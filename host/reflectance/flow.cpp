@@ -104,6 +104,8 @@ Status check(const DisFlowOptions& o) {
             "flow: DIS needs finest_scale >= 0, patch_size >= 4, patch_stride from 1 to patch_size, iterations >= 1");
     if (o.refinements < 0 || o.final_refinements < 0 || !(o.smoothness > 0 && o.brightness >= 0 && o.gradient >= 0))
         return fail("flow: DIS needs refinements >= 0, smoothness > 0, weights of brightness and gradient >= 0");
+    if (!o.search && o.final_refinements == 0)
+        return fail("flow: DIS without search and without final refinements does nothing: ask for one of them");
     return Done{};
 }
 
@@ -119,6 +121,7 @@ Status check_descent(const Options& o) {
     if (o.warps < 1 || o.finest_warps < 1 || o.reweightings < 1 || o.sweeps < 1 || o.coarsest < 4 || o.finest_level < 0)
         return fail(
             "flow: warps, reweightings and sweeps must be at least 1, coarsest at least 4, finest_level at least 0");
+    if (!(o.initial_octaves >= 0)) return fail("flow: initial_octaves must be at least 0");
     if (!(o.smoothness > 0)) return fail("flow: smoothness must be above 0: else textureless pixels have no flow");
     return check_detail(o.detail);
 }
@@ -149,36 +152,56 @@ FlowField run(const FlowPair& pair, const BroxFlowOptions& options, const FlowFi
     return brox_flow(pair, options, initial);
 }
 
-std::vector<std::pair<std::string, FlowOptions>> methods() {
-    BroxFlowOptions half, fine;
-    half.finest_level = 1;
-    fine.ratio = 0.8;
-    fine.warps = fine.finest_warps = 3;
+struct NamedMethod {
+    std::string name;
+    FlowOptions options;
+};
+
+std::vector<NamedMethod> methods() {
     return {
         {"dis-ultrafast", {DisFlowOptions{.finest_scale = 2, .patch_stride = 4, .iterations = 12, .refinements = 0}}},
         {"dis-fast", {DisFlowOptions{.finest_scale = 2, .patch_stride = 4, .iterations = 16}}},
-        {"brox-half", {half}},
+        {"brox-quick", {BroxFlowOptions{.warps = 1, .finest_warps = 1, .finest_level = 1}}},
+        {"brox-half", {BroxFlowOptions{.finest_level = 1}}},
+        {"robust-half", {RobustFlowOptions{.finest_level = 1}}},
         {"dis-medium", {DisFlowOptions{}}},
         {"brox", {BroxFlowOptions{}}},
         {"robust", {RobustFlowOptions{}}},
         {"dis-refined", {DisFlowOptions{.final_refinements = 5}}},
-        {"brox-fine", {fine}}};
+        {"brox-fine", {BroxFlowOptions{.ratio = 0.8, .warps = 3, .finest_warps = 3}}}};
+}
+
+// For `initial` flows within about a pixel of the truth: no pyramid.
+std::vector<NamedMethod> refinements() {
+    return {{"refine-half", {BroxFlowOptions{.finest_warps = 1, .finest_level = 1, .initial_octaves = 0}}},
+            {"refine", {BroxFlowOptions{.finest_warps = 1, .initial_octaves = 0}}},
+            {"refine-robust", {RobustFlowOptions{.finest_warps = 1, .initial_octaves = 0}}},
+            {"refine-variational", {DisFlowOptions{.search = false, .final_refinements = 5}}}};
+}
+
+std::vector<std::string> names_of(const std::vector<NamedMethod>& all) {
+    std::vector<std::string> names;
+    for (const NamedMethod& one : all) names.push_back(one.name);
+    return names;
 }
 
 }  // namespace
 
 std::vector<std::string> flow_method_names() {
-    std::vector<std::string> names;
-    for (const auto& [name, options] : methods()) names.push_back(name);
-    return names;
+    return names_of(methods());
+}
+
+std::vector<std::string> flow_refinement_names() {
+    return names_of(refinements());
 }
 
 Result<FlowOptions> flow_method(const std::string& name) {
     std::string known;
-    for (const auto& [candidate, options] : methods()) {
-        if (candidate == name) return options;
-        known += (known.empty() ? "" : ", ") + candidate;
-    }
+    for (const std::vector<NamedMethod>& all : {methods(), refinements()})
+        for (const NamedMethod& one : all) {
+            if (one.name == name) return one.options;
+            known += (known.empty() ? "" : ", ") + one.name;
+        }
     return fail("no flow method '" + name + "': there are " + known);
 }
 

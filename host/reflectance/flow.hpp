@@ -25,7 +25,11 @@ struct FlowOptions {
 // The methods of docs/motion.md by name, from the fastest on.
 std::vector<std::string> flow_method_names();
 
-// Error: no such method; says which there are.
+// Those that only mend a flow that is given as `initial` and nearly right (within about a pixel at the resolution that they
+// work at), for a fraction of the time.
+std::vector<std::string> flow_refinement_names();
+
+// Of either. Error: no such method; says which there are.
 Result<FlowOptions> flow_method(const std::string& name);
 
 // Where each pixel of `from` is found in `to`, in pixels: one-channel images of the same size, at least 16 pixels a side, in

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace ols {
 
@@ -77,40 +78,34 @@ FlowPair reduced(const FlowPair& pair, double ratio) {
 
 }  // namespace
 
-FlowPyramid flow_pyramid(const FlowPair& pair, double ratio, int coarsest, const FlowDetail& detail) {
-    assert(pair.from.channels == 1 && pair.to.channels == 1);
-    assert(pair.from.width == pair.to.width && pair.from.height == pair.to.height && ratio > 0 && ratio < 1);
-    FlowPyramid pyramid{.levels = {pair}, .ratio = ratio};
+FlowPyramid flow_pyramid(const FlowPair& pair, const FlowLevels& which, const FlowDetail& detail) {
+    assert(pair.from.channels == 1 && pair.to.channels == 1 && pair.from.width == pair.to.width &&
+           pair.from.height == pair.to.height && which.ratio > 0 && which.ratio < 1);
+    FlowPyramid pyramid{.width = pair.from.width, .height = pair.from.height, .levels = {pair}};
     if (detail.smoothing > 0)
         for (Image* image : {&pyramid.levels[0].from, &pyramid.levels[0].to})
             *image = smoothed(*image, detail.smoothing);
-    for (;;) {
+    const double above_finest = std::ceil(which.octaves * std::log(0.5) / std::log(which.ratio) - 1e-9);
+    int finer_left = which.finest;
+    while (finer_left > 0 || double(pyramid.levels.size()) <= above_finest) {
         const FlowPair& last = pyramid.levels.back();
         const int side = std::min(last.from.width, last.from.height);
-        const int next = int(std::lround(side * ratio));
-        if (next < coarsest || next == side) break;
-        pyramid.levels.push_back(reduced(last, ratio));
+        const int next = int(std::lround(side * which.ratio));
+        if (next < which.coarsest || next == side) break;
+        FlowPair smaller = reduced(last, which.ratio);
+        if (finer_left-- > 0) pyramid.levels.clear();
+        pyramid.levels.push_back(std::move(smaller));
     }
     take_detail(pyramid.levels, detail);
     return pyramid;
 }
 
-FlowField coarse_to_fine(const FlowPyramid& pyramid, int finest_level, const FlowField* initial,
-                         const SolveLevel& solve) {
+FlowField coarse_to_fine(const FlowPyramid& pyramid, const FlowField* initial, const SolveLevel& solve) {
     const auto& levels = pyramid.levels;
-    const size_t finest = std::min(size_t(finest_level), levels.size() - 1);
-    size_t level = levels.size() - 1;
-    FlowField flow(levels[level].from.width, levels[level].from.height);
-    if (initial) {
-        const size_t octave = size_t(std::ceil(std::log(0.5) / std::log(pyramid.ratio) - 1e-9));
-        level = std::min(level, finest + octave);
-        flow = *initial;
-    }
-    for (;; --level) {
+    FlowField flow = initial ? *initial : FlowField(levels.back().from.width, levels.back().from.height);
+    for (size_t level = levels.size(); level-- > 0;)
         flow = solve(level, resized(flow, levels[level].from.width, levels[level].from.height));
-        if (level == finest) break;
-    }
-    return resized(flow, levels[0].from.width, levels[0].from.height);
+    return resized(flow, pyramid.width, pyramid.height);
 }
 
 void median_filter(FlowField& flow) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "reflectance/flow_field.hpp"
@@ -18,20 +19,25 @@ struct FlowDetail {
     float smoothing = 0.5f;  // pixels of full resolution: a blur before all else, against noise
 };
 
-struct FlowPyramid {
-    std::vector<FlowPair> levels;  // of detail, from full resolution down
-    double ratio = 0.5;            // of a level's sides to those of the level before
+// Which resolutions are worked at. Level 0 is full resolution, whose sides shrink by `ratio` from level to level.
+struct FlowLevels {
+    double ratio = 0.5;
+    int coarsest = 16;                                         // pixels: no level but the first has a shorter side
+    int finest = 0;                                            // where it ends; the flow is enlarged from there
+    double octaves = std::numeric_limits<double>::infinity();  // by which the coarsest lies above the finest, at most
 };
 
-// No level but the first has a side shorter than `coarsest` pixels.
-FlowPyramid flow_pyramid(const FlowPair& pair, double ratio, int coarsest, const FlowDetail& detail);
+struct FlowPyramid {
+    int width = 0, height = 0;     // of full resolution
+    std::vector<FlowPair> levels;  // of detail, from the finest down
+};
 
-// Solves level after level, from the coarsest to `finest_level`; `solve` takes a level's flow from where the last one ended.
-// With `initial` (full resolution), from that flow, at the first level that is no finer than twice the finest: what is left
-// to find is small. The result has full resolution.
+FlowPyramid flow_pyramid(const FlowPair& pair, const FlowLevels& which, const FlowDetail& detail);
+
+// Solves level after level, from the coarsest to the finest; `solve` takes a level's flow from where the last one ended, and
+// level 0 is the finest. Begins with `initial` (full resolution), or zero. The result has full resolution.
 using SolveLevel = std::function<FlowField(size_t level, const FlowField& begin)>;
-FlowField coarse_to_fine(const FlowPyramid& pyramid, int finest_level, const FlowField* initial,
-                         const SolveLevel& solve);
+FlowField coarse_to_fine(const FlowPyramid& pyramid, const FlowField* initial, const SolveLevel& solve);
 
 // A 5 x 5 median of each component (Sun, Roth and Black, "Secrets of optical flow estimation and their principles", CVPR
 // 2010): takes out what a robust data term left standing alone.

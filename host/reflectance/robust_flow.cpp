@@ -177,9 +177,11 @@ FlowField solve_level(const FlowPair& pair, const FlowField& begin, const Robust
 }  // namespace
 
 FlowField robust_flow(const FlowPair& pair, const RobustFlowOptions& options, const FlowField* initial) {
-    const FlowPyramid pyramid = flow_pyramid(pair, 0.5, options.coarsest, options.detail);
-    return coarse_to_fine(pyramid, options.finest_level, initial, [&](size_t level, const FlowField& begin) {
-        return solve_level(pyramid.levels[level], begin, options, level == size_t(options.finest_level));
+    FlowLevels which{.ratio = 0.5, .coarsest = options.coarsest, .finest = options.finest_level};
+    if (initial) which.octaves = options.initial_octaves;
+    const FlowPyramid pyramid = flow_pyramid(pair, which, options.detail);
+    return coarse_to_fine(pyramid, initial, [&](size_t level, const FlowField& begin) {
+        return solve_level(pyramid.levels[level], begin, options, level == 0);
     });
 }
 

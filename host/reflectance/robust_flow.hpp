@@ -14,7 +14,7 @@ namespace ols {
 // where the papers take a step of each by a bound of its second derivative; the image is warped and linearised anew more than
 // once a level; what is compared is the images' detail; the flow is median-filtered after each stage (Sun, Roth and Black 2010, "Secrets of optical flow").
 struct RobustFlowOptions {
-    FlowDetail detail = {};
+    FlowDetail detail = {.radius = 3};
     float smoothness = 1.0f;
     float data_sigma = 0.04f;  // of the detail's standard deviation
     float flow_sigma = 0.05f;  // pixels a pixel
@@ -25,6 +25,7 @@ struct RobustFlowOptions {
     int sweeps = 6;        // of red-black over-relaxation, a reweighting
     int coarsest = 16;     // pixels: no pyramid level has a shorter side
     int finest_level = 0;  // 0: full resolution; 1: half, and the flow enlarged
+    double initial_octaves = 1;  // by which the level where a given flow is taken up is coarser than the finest
 };
 
 // The flow between the two images of a pyramid, from zero or from `initial`. Deterministic: the same bits for any thread count

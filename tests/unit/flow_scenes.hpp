@@ -138,10 +138,12 @@ inline FlowScene layers_scene(const std::string& name, int width, int height, co
 }
 
 // A ball before black, turning about its vertical axis, seen orthographically; evenly lit: brightness falls by a third towards
-// its rim, with the surface's slope. A stand-in for a head: what it shows slides over its outline.
+// its rim, with the surface's slope. A stand-in for a head: what it shows slides over its outline. Scored is what is seen at a slope
+// that leaves two pixels to a texture lattice of five: nearer the rim the pixels do not hold the texture.
 inline FlowScene ball_scene(const std::string& name, int width, int height, const Texture& texture, double turn_deg) {
     FlowScene scene{name, Image(width, height, 1), Image(width, height, 1), FlowField(width, height),
                     std::vector<unsigned char>(size_t(width) * size_t(height))};
+    constexpr double steepest = 0.4;  // cosine
     const double radius = 0.42 * height, cx = width / 2.0, cy = height / 2.0, turn = turn_deg * M_PI / 180;
     const auto seen = [&](double px, double py, double angle) {
         const double x = px - cx, y = py - cy, rim = std::hypot(x, y);
@@ -161,7 +163,7 @@ inline FlowScene ball_scene(const std::string& name, int width, int height, cons
             if (rim2 >= radius * radius) continue;
             const double z = std::sqrt(radius * radius - rim2);
             scene.truth.u[at] = float(std::cos(turn) * x + std::sin(turn) * z - x);
-            scene.scored[at] = std::cos(turn) * z - std::sin(turn) * x > 0.1 * radius && z > 0.1 * radius;
+            scene.scored[at] = std::cos(turn) * z - std::sin(turn) * x > steepest * radius && z > steepest * radius;
         }
     return scene;
 }
@@ -183,14 +185,16 @@ inline FlowScene noisy(FlowScene scene, unsigned seed = 1) {
     return scene;
 }
 
-// Mean endpoint error in pixels over what is scored, without a margin of the image's border.
+// Mean endpoint error in pixels over what is scored, and lies within a margin from the border in both images.
 inline double endpoint_error(const FlowField& flow, const FlowScene& scene, int margin = 8) {
     double sum = 0;
     size_t count = 0;
     for (int y = margin; y < flow.height - margin; ++y)
         for (int x = margin; x < flow.width - margin; ++x) {
             const size_t at = size_t(y) * size_t(flow.width) + size_t(x);
-            if (!scene.scored[at]) continue;
+            const float tx = float(x) + scene.truth.u[at], ty = float(y) + scene.truth.v[at], m = float(margin);
+            const bool stays = tx >= m && ty >= m && tx < float(flow.width) - m && ty < float(flow.height) - m;
+            if (!scene.scored[at] || !stays) continue;
             sum += std::hypot(double(flow.u[at]) - scene.truth.u[at], double(flow.v[at]) - scene.truth.v[at]);
             count++;
         }
