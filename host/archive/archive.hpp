@@ -7,7 +7,9 @@
 //   take.rfa/lights.lp                 the lamps as lamp_000 ... and their directions, for other programs
 //   take.rfa/cam0/target_000000.exr    tiled, scene-linear, parts: "lamps" (layers lamp_000.Y, or .R .G .B),
 //                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known),
-//                                      "noise_gain" (Y, FLOAT; left out when no sample was filled in)
+//                                      "noise_gain" (Y, FLOAT; left out when no sample was filled in),
+//                                      "confidence" (Y, FLOAT; left out when nothing was aligned),
+//                                      "motion" (instant_000.u .v ..., HALF; left out when not known)
 //
 // A target counts only when its journal line is complete and its file agrees with it. A target's file gets its name
 // after its bytes are on the disk, and its journal line after that.
@@ -21,6 +23,7 @@
 #include <vector>
 
 #include "image/frame.hpp"
+#include "image/target_motion.hpp"
 #include "result.hpp"
 #include "stage/lamps.hpp"
 
@@ -54,6 +57,7 @@ struct Target {
     std::vector<float> confidence;
     std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
     nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
+    TargetMotion motion;             // empty if not known; a target that was read has the times only: read_motion()
 
     int planes() const { return cfa == Cfa::rgb ? 3 : 1; }
 };
@@ -95,7 +99,8 @@ class ArchiveWriter {
 
     // Writes a target to a temporary name, fsyncs, renames, then journals it; for one thread at a time. After an error
     // (a full disk, say) neither file nor journal line stays, what was written before is untouched, and the writer may
-    // be used on. Values that the sample type cannot hold are clamped and masked (mask_clamped), never Inf or NaN.
+    // be used on. Values that the sample type cannot hold are clamped and masked (mask_clamped), never Inf or NaN. Motion is
+    // stored as half floats, an error of at most 1/2048 of a vector; one that check_motion() refuses is an error.
     Status write_target(const Target& target);
 
     // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.
@@ -145,7 +150,7 @@ class ArchiveReader {
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
     bool finished() const;                            // the journal has its end
 
-    // Everything of a target but its samples: size, colour filter, missing lamps, provenance.
+    // Everything of a target but its samples: size, colour filter, missing lamps, provenance, times of its motion.
     Result<Target> read_head(uint32_t camera, uint32_t index) const;
 
     // Reads one finished target with all its lamps: width * height * lamps * planes * 4 bytes.
@@ -153,6 +158,9 @@ class ArchiveReader {
 
     // A part of a target, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels.
     Result<Target> read_box(uint32_t camera, uint32_t index, const Box& box) const;
+
+    // The motion of a finished target, which no other call reads; an error where it has none.
+    Result<TargetMotion> read_motion(uint32_t camera, uint32_t index) const;
 
     // Compares every file with the journal's size and checksum and opens it.
     Verification verify() const;

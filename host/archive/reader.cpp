@@ -128,6 +128,12 @@ Result<Target> ArchiveReader::read_box(uint32_t camera, uint32_t index, const Bo
     return target;
 }
 
+Result<TargetMotion> ArchiveReader::read_motion(uint32_t camera, uint32_t index) const {
+    const auto file = finished_file(state_->root, state_->journal, camera, index);
+    if (!file) return file.error();
+    return read_target_motion(*file, state_->info);
+}
+
 Verification ArchiveReader::verify() const {
     const fs::path& root = state_->root;
     const Journal& journal = state_->journal;

@@ -22,6 +22,7 @@
 
 #include "archive/exr_stream.hpp"
 #include "archive/manifest.hpp"
+#include "archive/motion_part.hpp"
 
 namespace ols {
 
@@ -103,9 +104,20 @@ Imf::Header lamps_header(const TakeInfo& info, const Target& head) {
     return header;
 }
 
-Imf::Header data_header(const TakeInfo& info, const Target& head, const char* name, Imf::PixelType type) {
+Imf::Header data_header(const TakeInfo& info, const Target& head, const char* name) {
     Imf::Header header = part_header(info, head, name);
     add_string(header, "colorInteropID", "data");
+    return header;
+}
+
+Imf::Header motion_header(const TakeInfo& info, const Target& head) {
+    Imf::Header header = data_header(info, head, "motion");
+    add_motion_layers(header, head.motion.times_s);
+    return header;
+}
+
+Imf::Header plane_header(const TakeInfo& info, const Target& head, const char* name, Imf::PixelType type) {
+    Imf::Header header = data_header(info, head, name);
     header.channels().insert("Y", Imf::Channel(type));
     return header;
 }
@@ -155,9 +167,11 @@ void write_plane(Imf::TiledOutputPart part, Imf::PixelType type, const void* sam
 }
 
 Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, const PlaneSource& source) {
-    std::vector<Imf::Header> headers = {lamps_header(info, head), data_header(info, head, "mask", Imf::UINT)};
-    if (!head.variance.empty()) headers.push_back(data_header(info, head, "variance", Imf::FLOAT));
-    if (!head.noise_gain.empty()) headers.push_back(data_header(info, head, "noise_gain", Imf::FLOAT));
+    std::vector<Imf::Header> headers = {lamps_header(info, head), plane_header(info, head, "mask", Imf::UINT)};
+    if (!head.variance.empty()) headers.push_back(plane_header(info, head, "variance", Imf::FLOAT));
+    if (!head.noise_gain.empty()) headers.push_back(plane_header(info, head, "noise_gain", Imf::FLOAT));
+    if (!head.confidence.empty()) headers.push_back(plane_header(info, head, "confidence", Imf::FLOAT));
+    if (!head.motion.flows.empty()) headers.push_back(motion_header(info, head));
     std::vector<uint32_t> mask = head.mask;
     mask.resize(size_t(head.width) * head.height);
     const auto channels = plane_channels(int(info.lights.size()), head.cfa);
@@ -169,8 +183,9 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
     if (!written) return written;
     write_plane(Imf::TiledOutputPart(file, 1), Imf::UINT, mask.data(), head);
     int part = 2;
-    for (const auto* plane : {&head.variance, &head.noise_gain})
+    for (const auto* plane : {&head.variance, &head.noise_gain, &head.confidence})
         if (!plane->empty()) write_plane(Imf::TiledOutputPart(file, part++), Imf::FLOAT, plane->data(), head);
+    if (!head.motion.flows.empty()) write_motion_tiles(Imf::TiledOutputPart(file, part), head.motion);
     return Done{};
 }
 
@@ -181,6 +196,8 @@ std::string target_file_name(uint32_t camera, uint32_t index) {
 }
 
 Status write_target_file(const std::string& path, const TakeInfo& info, const Target& head, const PlaneSource& source) {
+    if (auto s = check_motion(head.motion, head.width, head.height); !s) return s;
+    if (auto s = check_motion_range(head.motion); !s) return s;
     ExrStream stream(path);
     Status written = Done{};
     try {
@@ -225,7 +242,7 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
     if (window.min != Imath::V2i(0, 0)) return fail("'" + path + "' has a data window that does not begin at 0, 0");
     target.width = window.max.x + 1;
     target.height = window.max.y + 1;
-    for (const char* name : {"mask", "variance", "noise_gain"})
+    for (const char* name : {"mask", "variance", "noise_gain", "confidence", "motion"})
         if (const int p = find_part(file, name); p >= 0 && file.header(p).dataWindow() != window)
             return fail("'" + path + "' has parts of different sizes");
     target.provenance = nlohmann::json::parse(string_attribute(header, "provenance"), nullptr, false);
@@ -233,6 +250,11 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
     if (target.provenance.is_discarded() || !missing.is_array())
         return fail("'" + path + "' has a damaged header: its provenance or missing lamps are not JSON");
     for (const auto& lamp : missing) target.missing_lamps.push_back(lamp.get<int>());
+    if (const int p = find_part(file, "motion"); p >= 0) {
+        const auto times_s = motion_times(file.header(p));
+        if (!times_s) return fail("'" + path + "': " + times_s.error().message);
+        target.motion.times_s = *times_s;
+    }
     return target;
 }
 
@@ -307,9 +329,26 @@ Result<Target> read_target_box(const std::string& path, const TakeInfo& info, Bo
         read_plane(file, "mask", Imf::UINT, target.mask, tiles, box);
         read_plane(file, "variance", Imf::FLOAT, target.variance, tiles, box);
         read_plane(file, "noise_gain", Imf::FLOAT, target.noise_gain, tiles, box);
+        read_plane(file, "confidence", Imf::FLOAT, target.confidence, tiles, box);
         target.width = box.width;
         target.height = box.height;
         return head;
+    } catch (const std::exception& e) {
+        return fail("cannot read '" + path + "': " + e.what());
+    }
+}
+
+Result<TargetMotion> read_target_motion(const std::string& path, const TakeInfo& info) {
+    try {
+        Imf::MultiPartInputFile file(path.c_str());
+        auto head = head_of(file, path, info);
+        if (!head) return head.error();
+        TargetMotion motion = std::move(head->motion);
+        if (motion.times_s.empty()) return fail("'" + path + "' has no motion: the take was made without");
+        motion.flows = read_motion_tiles(Imf::TiledInputPart(file, find_part(file, "motion")), motion.times_s.size());
+        const auto checked = check_motion(motion, head->width, head->height);
+        if (!checked) return fail("'" + path + "': " + checked.error().message);
+        return motion;
     } catch (const std::exception& e) {
         return fail("cannot read '" + path + "': " + e.what());
     }

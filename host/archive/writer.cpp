@@ -122,8 +122,10 @@ Status ArchiveWriter::write_target(const Target& target) {
     head.mask = target.mask;
     head.variance = target.variance;
     head.noise_gain = target.noise_gain;
+    head.confidence = target.confidence;
     head.missing_lamps = target.missing_lamps;
     head.provenance = target.provenance;
+    head.motion = target.motion;
     return write_target(head, [&](int plane, const Box& box, float* out) -> Status {
         for (int y = 0; y < box.height; ++y)
             std::copy_n(target.lamps[plane].data() + size_t(box.y + y) * target.width + box.x, box.width,

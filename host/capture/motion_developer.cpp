@@ -29,6 +29,24 @@ double middle_tick(const Frame& frame) {
     return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
 }
 
+// The flows to the knots from the last before -reach to the first after reach, for motion blur.
+TargetMotion motion_around(const MotionPath& path, double reach_s, const Target& target) {
+    const auto is_instant = [](const MotionKnot& knot) { return knot.is_instant; };
+    const auto self = std::ranges::find_if(path, is_instant);
+    const auto seconds = [&](const MotionKnot& knot) { return (knot.tick - self->tick) / double(tick_hz); };
+    TargetMotion motion;
+    for (size_t i = 0; i < path.size(); ++i) {
+        if (path[i].is_instant) continue;
+        const bool is_needed = std::abs(seconds(path[i])) < reach_s ||
+                               (i + 1 < path.size() && std::abs(seconds(path[i + 1])) < reach_s) ||
+                               (i > 0 && std::abs(seconds(path[i - 1])) < reach_s);
+        if (!is_needed) continue;
+        motion.times_s.push_back(seconds(path[i]));
+        motion.flows.push_back(resized(path[i].flow, target.width, target.height));
+    }
+    return motion;
+}
+
 }  // namespace
 
 MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration,
@@ -74,7 +92,7 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
         to = std::max(to, middle_tick(*frame));
     }
     if (frames.tracking.empty()) {
-        MotionKnot alone{from, FlowField(int(frames.frames[0]->width), int(frames.frames[0]->height)), {}};
+        MotionKnot alone{from, FlowField(int(frames.frames[0]->width), int(frames.frames[0]->height)), {}, true};
         alone.confidence.assign(alone.flow.size(), 0.0f);
         return MotionPath{std::move(alone)};
     }
@@ -146,7 +164,9 @@ Result<Target> MotionDeveloper::develop(const TargetFrames& frames, const Motion
     auto aligned = align(frames, path ? *path : *found);
     if (!aligned.ok()) return aligned.error();
     const Stopwatch watch(times_.invert);
-    return developer_.develop(*aligned, frames.basis.lost);
+    auto target = developer_.develop(*aligned, frames.basis.lost);
+    if (target.ok()) target->motion = motion_around(path ? *path : *found, quality_.motion_reach_s, *target);
+    return target;
 }
 
 }  // namespace ols

@@ -1,23 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Flow fields: where each pixel of one image is found in another.
+// What is done with flow fields: resizing, concatenation, warping.
 #pragma once
 
 #include <cstddef>
 #include <vector>
 
+#include "image/flow_field.hpp"
 #include "image/frame.hpp"
 
 namespace ols {
-
-// from(x, y) looks like to(x + u, y + v), in pixels. Rows top to bottom.
-struct FlowField {
-    int width = 0, height = 0;
-    std::vector<float> u, v;
-
-    FlowField() = default;
-    FlowField(int w, int h) : width(w), height(h), u(size_t(w) * size_t(h)), v(size_t(w) * size_t(h)) {}
-    size_t size() const { return u.size(); }
-};
 
 // Two images of one channel and the same size, and where they show the subject: 1 where a pixel is seen, 0 where it is
 // saturated, lost or not a number; empty when all of it is seen. What is not seen is finite all the same.

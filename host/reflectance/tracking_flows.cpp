@@ -45,7 +45,7 @@ Status first_error(std::span<const std::string> errors) {
 }
 
 MotionKnot still(double tick, int width, int height) {
-    MotionKnot knot{tick, FlowField(width, height), {}};
+    MotionKnot knot{tick, FlowField(width, height), {}, true};
     knot.confidence.assign(knot.flow.size(), 1.0f);
     return knot;
 }
@@ -114,7 +114,7 @@ Status TrackingFlows::find_local_flows(size_t first, size_t last) {
 Status TrackingFlows::walk(const Image* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
                            MotionPath& path) const {
     for (;;) {
-        path.push_back({frames_[at].tick, flow, confidence(flow, back)});
+        path.push_back({frames_[at].tick, flow, confidence(flow, back), false});
         if (at == end) return Done{};
         const Frame& pair = frames_[direction > 0 ? at : at - 1];
         const FlowField &away = *(direction > 0 ? pair.forward : pair.backward),

@@ -27,6 +27,7 @@ struct MotionKnot {
     double tick = 0;
     FlowField flow;
     std::vector<float> confidence;  // of each pixel (flow.hpp, confidence())
+    bool is_instant = false;        // the instant itself
 };
 
 // Ascending in time, the instant itself among them, with zero flow and confidence 1. Between two knots the subject moves at

@@ -33,6 +33,7 @@ json target_report(const ArchiveReader& archive, const TargetEntry& entry) {
     report["pixels"] = cfa_words[int(head->cfa)];
     report["missing_lamps"] = head->missing_lamps;
     report["provenance"] = head->provenance;
+    report["motion_times_s"] = head->motion.times_s;
     return report;
 }
 
@@ -52,6 +53,9 @@ std::string target_line(const json& target) {
     if (target.contains("damaged")) return name + ": damaged: " + target["damaged"].get<std::string>();
     auto line = fmt::format("{}: {} x {}, {}, {:.1f} MB", name, target["width"].get<int>(), target["height"].get<int>(),
                             target["pixels"].get<std::string>(), target["bytes"].get<double>() / 1e6);
+    if (const auto& times = target["motion_times_s"]; !times.empty())
+        line += fmt::format(", motion at {} instants from {:+.1f} to {:+.1f} ms", times.size(),
+                            times.front().get<double>() * 1e3, times.back().get<double>() * 1e3);
     if (const auto& lamps = target["missing_lamps"]; !lamps.empty())
         line += fmt::format(", {} lamps missing: {}", lamps.size(), lamps.dump());
     return line;

@@ -15,6 +15,7 @@
 #include "image/png.hpp"
 #include "image/tone.hpp"
 #include "lighting.hpp"
+#include "shutter.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -25,6 +26,7 @@ struct Options {
     std::string archive, target = "first", output, png;
     uint32_t camera = 0;
     LightingOptions lighting;
+    ShutterOptions shutter;
     int threads = 0;
     bool single_float = false, json = false;
 };
@@ -122,14 +124,17 @@ std::string output_name(const std::string& path, const TargetEntry& entry, bool 
 }
 
 std::map<std::string, std::string> header_attributes(const TakeInfo& info, const Options& options) {
-    return {{"colorInteropID", info.color_interop_id},
-            {"production", info.production},
-            {"scene", info.scene},
-            {"take", info.take},
-            {"relit.valueUnit", info.value_unit},
-            {"relit.environment", std::filesystem::path(options.lighting.environment).filename().string()},
-            {"relit.rotateDegrees", fmt::format("{}", options.lighting.rotate_deg)},
-            {"relit.exposureEV", fmt::format("{}", options.lighting.exposure_ev)}};
+    std::map<std::string, std::string> attributes = {
+        {"colorInteropID", info.color_interop_id},
+        {"production", info.production},
+        {"scene", info.scene},
+        {"take", info.take},
+        {"relit.valueUnit", info.value_unit},
+        {"relit.environment", std::filesystem::path(options.lighting.environment).filename().string()},
+        {"relit.rotateDegrees", fmt::format("{}", options.lighting.rotate_deg)},
+        {"relit.exposureEV", fmt::format("{}", options.lighting.exposure_ev)}};
+    if (options.shutter.is_open()) attributes.merge(options.shutter.header_attributes());
+    return attributes;
 }
 
 void warn(const RelitTarget& relit, const std::string& file, double light_missing, size_t clamped_values) {
@@ -149,6 +154,15 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
                                          const Lighting& lighting, const Options& options, bool several) {
     auto relit = relight_target(archive, entry, lighting.weights, options.threads);
     if (!relit) return relit.error();
+    nlohmann::json shutter;
+    if (options.shutter.is_open()) {
+        auto blurred = through_shutter(archive, entry, relit->image, options.shutter, options.threads);
+        if (!blurred) return blurred.error();
+        for (const auto& warning : shutter_warnings(*blurred))
+            fmt::print(stderr, "rf relight: {}: {}\n", entry.file, warning);
+        shutter = shutter_report(options.shutter, *blurred);
+        relit->image = std::move(blurred->image);
+    }
     const double light_missing = share_of_light(lighting.weights, relit->missing_lamps);
     const size_t clamped_values = options.single_float ? 0 : values_beyond_half(relit->image);
     warn(*relit, entry.file, light_missing, clamped_values);
@@ -169,6 +183,7 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
                           {"missing_light", light_missing},
                           {"left_out_samples", relit->left_out_samples},
                           {"clamped_values", clamped_values},
+                          {"shutter", shutter},
                           {"masked_pixels",
                            {{"saturated", relit->saturated},
                             {"missing", relit->missing},
@@ -183,6 +198,8 @@ Status run(const Options& options) {
     if (!cells) return fail("'" + options.archive + "': " + cells.error().message);
     const auto targets = chosen_targets(*archive, options);
     if (!targets) return targets.error();
+    if (options.shutter.is_open())
+        if (const auto known = check_motion_known(*archive, options.archive, *targets); !known) return known;
     const auto lighting = make_lighting(options.lighting, *cells);
     if (!lighting) return lighting.error();
     for (const auto& warning : lighting->warnings) fmt::print(stderr, "rf relight: {}\n", warning);
@@ -211,6 +228,7 @@ void add_relight_verb(CLI::App& app, int& exit_code) {
                     tone_curve_text));
     verb->add_option("archive", options->archive, "take.rfa")->required();
     options->lighting.add_to(*verb);
+    options->shutter.add_to(*verb);
     verb->add_option("--target", options->target, "number, `first` or `all` (then file names get _NNNNNN)")
         ->type_name("N");
     verb->add_option("--camera", options->camera, "camera of the targets")->type_name("N");
