@@ -19,6 +19,7 @@
 
 #include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
+#include "reflectance/variance.hpp"
 
 namespace ols {
 
@@ -302,20 +303,12 @@ void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32
 
 void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                        const NoiseModel& noise, std::span<const float> gain, float* out) {
-    assert(int(rows.size()) == basis.rows && (gain.empty() || gain.size() == samples));
-    std::vector<double> sums(samples);
-    for (int r = 0; r < basis.rows; ++r) {
-        double squares = 0;
-        for (int i = 0; i < basis.images(); ++i) squares += basis.inverse(r, i) * basis.inverse(r, i);
-        for (size_t p = 0; p < samples; ++p) {
-            const double sigma = noise.read_counts + noise.shot * std::sqrt(double(std::max(rows[r][p], 0)));
-            sums[p] += squares / basis.images() * sigma * sigma;
-        }
-    }
-    for (size_t p = 0; p < samples; ++p) {
-        const double factor = gain.empty() ? 1.0 : gain[p];
-        out[p] = float(factor * factor * sums[p]);
-    }
+    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
+}
+
+void estimate_variance(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
+                       const NoiseModel& noise, std::span<const float> gain, float* out) {
+    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
 }
 
 }  // namespace ols
