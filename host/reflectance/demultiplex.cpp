@@ -208,9 +208,9 @@ class MatrixWorker {
 
     template <typename Sample>
     void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
+        if (one_row_each_) return scale(rows, begin, count);
         bool fits_float = false;
         if constexpr (std::is_same_v<Sample, int32_t>) fits_float = largest_count(rows, count) < matrix_.counts_limit;
-        if (one_row_each_) return scale(rows, begin, count);
         if (fits_float)
             small_.invert(basis_, matrix_.floats, rows, count), store(small_.images, begin, count);
         else
