@@ -24,7 +24,8 @@ struct DemultiplexOptions {
 
 // lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
 // `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact when
-// |counts| < 2^23, which suits every camera of up to 16 bits. A basis without integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
+// |counts| < 2^23, which suits every camera of up to 16 bits. A basis without
+// integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
 void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                  std::span<float* const> lamps, const DemultiplexOptions& options = {});
 

@@ -26,7 +26,7 @@ struct PlaneGrid {
 // flow from there to the other one, both as vectors of the target's pixels. Made once for all slots of the group.
 //
 // Flow is smooth nearly everywhere: eight pixels of a row, of which base and step each stay within half of `tolerance_px` of a
-// straight line, count as lying on it; they take a seventh of the time to warp. Others, at edges of depth mostly, keep their own
+// straight line, count as lying on it; they take a third of the time to warp. Others, at edges of depth mostly, keep their own
 // vectors. 0 keeps all.
 class GroupMotion {
   public:

@@ -149,6 +149,31 @@ Setting remap_setting(const Size& size, const std::vector<std::vector<int16_t>>&
     return {name, run, error};
 }
 
+void measure_resolutions(Bench& bench, const Size& size, const std::vector<std::vector<int16_t>>& slots) {
+    std::vector<std::pair<FlowField, FlowField>> fields;
+    for (const int lower : {1, 2, 4}) fields.emplace_back(field(size, lower, base_scale), field(size, lower, 1));
+    std::vector<Setting> resolutions;
+    for (size_t i = 0; i < fields.size(); ++i) {
+        const auto make = [&, i] {
+            return GroupMotion(fields[i].first, fields[i].second, PlaneGrid{size.width, size.height});
+        };
+        resolutions.push_back({i == 0   ? "full"
+                               : i == 1 ? "half"
+                                        : "quarter",
+                               [make] {
+                                   std::vector<GroupMotion> made;
+                                   for (int g = 0; g < groups; ++g) made.push_back(make());
+                               },
+                               [&, make] { return error_of(size, slots, make()); }});
+    }
+    bench.measure({.name = "resolution of flow, ten groups made",
+                   .set_by = "`GroupMotion`, the fields' size",
+                   .error_unit = "counts rms",
+                   .peer = "full",
+                   .default_setting = "full",
+                   .settings = resolutions});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -189,27 +214,6 @@ int main(int argc, char** argv) {
                    .default_setting = "0.02",
                    .settings = settings});
 
-    std::vector<std::pair<FlowField, FlowField>> fields;
-    for (const int lower : {1, 2, 4}) fields.emplace_back(field(size, lower, base_scale), field(size, lower, 1));
-    std::vector<Setting> resolutions;
-    for (size_t i = 0; i < fields.size(); ++i) {
-        const auto make = [&, i] {
-            return GroupMotion(fields[i].first, fields[i].second, PlaneGrid{size.width, size.height});
-        };
-        resolutions.push_back({i == 0   ? "full"
-                               : i == 1 ? "half"
-                                        : "quarter",
-                               [make] {
-                                   std::vector<GroupMotion> made;
-                                   for (int g = 0; g < groups; ++g) made.push_back(make());
-                               },
-                               [&, make] { return error_of(size, slots, make()); }});
-    }
-    bench.measure({.name = "resolution of flow, ten groups made",
-                   .set_by = "`GroupMotion`, the fields' size",
-                   .error_unit = "counts rms",
-                   .peer = "full",
-                   .default_setting = "full",
-                   .settings = resolutions});
+    measure_resolutions(bench, size, slots);
     return bench.finish();
 }
