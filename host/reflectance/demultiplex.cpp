@@ -19,6 +19,7 @@
 
 #include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
+#include "reflectance/variance.hpp"
 
 namespace ols {
 
@@ -207,9 +208,9 @@ class MatrixWorker {
 
     template <typename Sample>
     void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
+        if (one_row_each_) return scale(rows, begin, count);
         bool fits_float = false;
         if constexpr (std::is_same_v<Sample, int32_t>) fits_float = largest_count(rows, count) < matrix_.counts_limit;
-        if (one_row_each_) return scale(rows, begin, count);
         if (fits_float)
             small_.invert(basis_, matrix_.floats, rows, count), store(small_.images, begin, count);
         else
@@ -302,20 +303,12 @@ void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32
 
 void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
                        const NoiseModel& noise, std::span<const float> gain, float* out) {
-    assert(int(rows.size()) == basis.rows && (gain.empty() || gain.size() == samples));
-    std::vector<double> sums(samples);
-    for (int r = 0; r < basis.rows; ++r) {
-        double squares = 0;
-        for (int i = 0; i < basis.images(); ++i) squares += basis.inverse(r, i) * basis.inverse(r, i);
-        for (size_t p = 0; p < samples; ++p) {
-            const double sigma = noise.read_counts + noise.shot * std::sqrt(double(std::max(rows[r][p], 0)));
-            sums[p] += squares / basis.images() * sigma * sigma;
-        }
-    }
-    for (size_t p = 0; p < samples; ++p) {
-        const double factor = gain.empty() ? 1.0 : gain[p];
-        out[p] = float(factor * factor * sums[p]);
-    }
+    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
+}
+
+void estimate_variance(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
+                       const NoiseModel& noise, std::span<const float> gain, float* out) {
+    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
 }
 
 }  // namespace ols

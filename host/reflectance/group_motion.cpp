@@ -228,35 +228,20 @@ double GroupMotion::linear_share() const {
     return own_index_.empty() ? 0 : 1 - double(own_.size()) / double(own_index_.size());
 }
 
-void GroupMotion::run_positions(int run, int y, float fraction, float (&x_out)[run_pixels],
-                                float (&y_out)[run_pixels]) const {
-    const size_t at = size_t(y) * size_t(runs_) + size_t(run);
-    const float begin = float(first_of(run));
-    if (own_index_[at] >= 0) {
-        const auto& own = own_[size_t(own_index_[at])].of;
-        for (int k = 0; k < run_pixels; ++k) {
-            x_out[k] = begin + float(k) + (own[0][k] + fraction * own[2][k]);
-            y_out[k] = float(y) + (own[1][k] + fraction * own[3][k]);
-        }
-        return;
-    }
-    const float u = lines_.base_u[at] + fraction * lines_.step_u[at];
-    const float v = lines_.base_v[at] + fraction * lines_.step_v[at];
-    const float du = lines_.base_du[at] + fraction * lines_.step_du[at];
-    const float dv = lines_.base_dv[at] + fraction * lines_.step_dv[at];
-    for (int k = 0; k < run_pixels; ++k) {
-        x_out[k] = begin + float(k) + (u + float(k) * du);
-        y_out[k] = float(y) + (v + float(k) * dv);
-    }
-}
-
 void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) const {
-    float x[run_pixels], row[run_pixels];
     for (int run = 0; run < runs_; ++run) {
-        run_positions(run, y, fraction, x, row);
-        const int first = first_of(run), count = std::min(run_pixels, width_);
-        std::copy_n(x, count, x_out + first);
-        std::copy_n(row, count, y_out + first);
+        const size_t at = size_t(y) * size_t(runs_) + size_t(run);
+        const auto component = [&](const std::vector<float>& base, const std::vector<float>& step) {
+            return base[at] + fraction * step[at];
+        };
+        const float u = component(lines_.base_u, lines_.step_u), du = component(lines_.base_du, lines_.step_du);
+        const float v = component(lines_.base_v, lines_.step_v), dv = component(lines_.base_dv, lines_.step_dv);
+        const OwnVectors* const own = own_vectors(run, y);
+        for (int k = 0; k < std::min(run_pixels, width_); ++k) {
+            const int x = first_of(run) + k;
+            x_out[x] = float(x) + (own ? own->of[0][k] + fraction * own->of[2][k] : u + float(k) * du);
+            y_out[x] = float(y) + (own ? own->of[1][k] + fraction * own->of[3][k] : v + float(k) * dv);
+        }
     }
 }
 

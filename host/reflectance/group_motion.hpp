@@ -26,7 +26,7 @@ struct PlaneGrid {
 // flow from there to the other one, both as vectors of the target's pixels. Made once for all slots of the group.
 //
 // Flow is smooth nearly everywhere: eight pixels of a row, of which base and step each stay within half of `tolerance_px` of a
-// straight line, count as lying on it; they take a seventh of the time to warp. Others, at edges of depth mostly, keep their own
+// straight line, count as lying on it; they take a third of the time to warp. Others, at edges of depth mostly, keep their own
 // vectors. 0 keeps all.
 class GroupMotion {
   public:
@@ -53,16 +53,19 @@ class GroupMotion {
     };
     const Lines& lines() const { return lines_; }
 
-    // Where the pixels of a run of row y are found at a fraction of the step, in the source's pixels.
-    void run_positions(int run, int y, float fraction, float (&x_out)[run_pixels], float (&y_out)[run_pixels]) const;
-    // The same of a row: width() values each.
-    void positions(int y, float fraction, float* x_out, float* y_out) const;
-
-  private:
-    // base u, base v, step u, step v.
+    // Of a run's pixels, where it is no line: base u, base v, step u, step v. Null where it is one.
     struct OwnVectors {
         float of[4][run_pixels];
     };
+    const OwnVectors* own_vectors(int run, int y) const {
+        const int32_t index = own_index_[size_t(y) * size_t(runs_) + size_t(run)];
+        return index < 0 ? nullptr : &own_[size_t(index)];
+    }
+
+    // Where the pixels of row y are found at a fraction of the step, in the source's pixels: width() values each.
+    void positions(int y, float fraction, float* x_out, float* y_out) const;
+
+  private:
     void make(const FlowField& base, const FlowField& step, const PlaneGrid& grid, float tolerance_px);
     void keep_own(const float* const (&rows)[4], int y, const std::vector<uint8_t>& is_line);
 

@@ -129,16 +129,13 @@ HWY_INLINE void eight(const CountPlane& source, const Shuffled& s, int16_t* out)
 
 #endif  // HWY_TARGET != HWY_SCALAR
 
-// Eight positions as whole pixels and weights.
-HWY_INLINE void find_sources(const CountPlane& source, const GroupMotion& motion, int run, int y, float fraction,
+// Eight positions as whole pixels and weights: base + fraction * step of each, or of the line. False where all are outside.
+HWY_INLINE bool find_sources(const CountPlane& source, const GroupMotion& motion, int run, int y, float fraction,
                              Sources& s) {
-    float at_x[at_once], at_y[at_once];
-    motion.run_positions(run, y, fraction, at_x, at_y);
     const hn::CappedTag<float, at_once> df;
     const hn::RebindToSigned<decltype(df)> di;
     const hn::Rebind<int16_t, decltype(df)> d16;
-    const auto part = [&](const float* coordinates, int size, int16_t* whole, int16_t* weight) HWY_ATTR {
-        const auto coordinate = hn::LoadU(df, coordinates);
+    const auto part = [&](auto coordinate, int size, int16_t* whole, int16_t* weight) HWY_ATTR {
         const auto held = hn::Min(hn::Max(coordinate, hn::Zero(df)), hn::Set(df, float(size - 1)));
         const auto at_pixel = hn::ConvertTo(di, held);
         const auto rest = hn::Sub(held, hn::ConvertTo(df, at_pixel));
@@ -147,12 +144,30 @@ HWY_INLINE void find_sources(const CountPlane& source, const GroupMotion& motion
         hn::StoreU(hn::DemoteTo(d16, units), d16, weight);  // saturates
         return hn::Not(hn::Eq(held, coordinate));           // NaN is outside, too
     };
+    const GroupMotion::Lines& lines = motion.lines();
+    const size_t at = size_t(y) * size_t(motion.runs()) + size_t(run);
+    const GroupMotion::OwnVectors* const own = motion.own_vectors(run, y);
+    const auto share = hn::Set(df, fraction);
+    bool is_inside = false;
     for (int k = 0; k < at_once; k += int(hn::Lanes(df))) {
-        const auto out_x = part(at_x + k, source.width, s.x + k, s.fx + k);
-        const auto out_y = part(at_y + k, source.height, s.y + k, s.fy + k);
-        const auto outside = hn::VecFromMask(di, hn::RebindMask(di, hn::Or(out_x, out_y)));
-        hn::StoreU(hn::DemoteTo(d16, outside), d16, s.outside + k);
+        const auto vector = [&](int component, const auto& base, const auto& base_change, const auto& step,
+                                const auto& step_change) HWY_ATTR {
+            const auto sum = [&](auto a, auto b) HWY_ATTR { return hn::Add(a, hn::Mul(share, b)); };
+            if (own) return sum(hn::LoadU(df, own->of[component] + k), hn::LoadU(df, own->of[component + 2] + k));
+            return hn::Add(
+                sum(hn::Set(df, base[at]), hn::Set(df, step[at])),
+                hn::Mul(hn::Iota(df, float(k)), sum(hn::Set(df, base_change[at]), hn::Set(df, step_change[at]))));
+        };
+        const auto u = vector(0, lines.base_u, lines.base_du, lines.step_u, lines.step_du);
+        const auto v = vector(1, lines.base_v, lines.base_dv, lines.step_v, lines.step_dv);
+        const auto pixel_x = hn::Iota(df, float(motion.first_of(run) + k)), pixel_y = hn::Set(df, float(y));
+        const auto out_x = part(hn::Add(pixel_x, u), source.width, s.x + k, s.fx + k);
+        const auto out_y = part(hn::Add(pixel_y, v), source.height, s.y + k, s.fy + k);
+        const auto outside = hn::Or(out_x, out_y);
+        is_inside = is_inside || !hn::AllTrue(df, outside);
+        hn::StoreU(hn::DemoteTo(d16, hn::VecFromMask(di, hn::RebindMask(di, outside))), d16, s.outside + k);
     }
+    return is_inside;
 }
 
 void warp_pixels(const CountPlane& source, const Sources& s, int precision, int16_t* out) {
@@ -163,7 +178,10 @@ void warp_pixels(const CountPlane& source, const Sources& s, int precision, int1
 template <int precision>
 void warp_run(const CountPlane& source, const GroupMotion& motion, int run, int y, float fraction, int16_t* out) {
     Sources s;
-    find_sources(source, motion, run, y, fraction, s);
+    if (!find_sources(source, motion, run, y, fraction, s)) {
+        std::fill_n(out, std::min(at_once, source.width), masked);
+        return;
+    }
 #if HWY_TARGET != HWY_SCALAR
     if (source.width >= table_pixels) {
         const D16 d;

@@ -21,9 +21,10 @@ struct RowRange {
 };
 
 // The rows of `range` of the slot at a fraction of the group's step: 0 at the tracking frame nearer to the target.
-// out[(y - range.first) * out_pitch + x] = the bilinear mean of the four counts around the position, rounded. A position outside the plane, or one of whose counts with a
-// weight above zero is masked, is masked. |counts| <= 16383; up to 4095 interpolation keeps two more bits. Integer arithmetic
-// but for the position: the same bits on every SIMD path and for any range. The position is within 2^-11 pixels of the line where it is on one.
+// out[(y - range.first) * out_pitch + x] = the bilinear mean of the four counts around the position, rounded. A position outside
+// the plane, or one of whose counts with a weight above zero is masked, is masked. |counts| <= 16383; up to 4095 interpolation
+// keeps two more bits. Integer arithmetic but for the position: the same bits on every SIMD path and for any range. Where the
+// position is on a line it is within 2^-11 pixels of it.
 void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                  int16_t* out, size_t out_pitch);
 // All rows.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -249,6 +250,102 @@ TEST(SampleWarp, infinite_samples_and_flow_that_is_no_number_become_masked) {
     for (size_t p = 0; p < out.size(); ++p) EXPECT_EQ(std::isnan(out[p]), p == 3 || p == 40 || p == 70) << p;
 }
 
+// Two runs at a time, one, and none that lie on lines, each beside each.
+TEST(WarpPaths, give_the_same_bits_where_runs_of_all_kinds_meet) {
+    Scene scene(206, 60);
+    std::mt19937 random(9);
+    scene.set_motion(
+        [&](int x, int y) {
+            const int kind = (x / 8 * 7 + y * 5) % 11;
+            const double rough = kind < 3 ? double(random() % 100) / 50 : 0;
+            return Vec3{0.7 + 0.02 * x + rough + (kind == 5 ? 1e3 : 0),
+                        -0.3 + 0.05 * x - (kind == 7 ? 0.4 * (x % 8) : 0), 0};
+        },
+        true);
+    for (size_t p = 0; p < scene.counts.size(); p += 53) scene.counts[p] = masked;
+    scene.tolerance_px = 0.02f;
+    std::vector<std::vector<int16_t>> results;
+    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        results.push_back(scene.warped());
+        hwy::SetSupportedTargetsForTest(0);
+    }
+    ASSERT_GT(results.size(), 1u);
+    for (const auto& result : results) EXPECT_EQ(result, results[0]);
+}
+
+TEST_P(Warp, lines_that_slip_a_row_or_a_column_mask_what_masked_counts_have_a_part_in) {
+    Scene scene(160, 40);
+    for (auto& count : scene.counts) count = 1000;
+    for (size_t p = 5; p < scene.counts.size(); p += 97) scene.counts[p] = masked;
+    scene.fraction = 0.5f;
+    // Eighths, so that lines are exact and some positions whole.
+    scene.set_motion([](int x, int y) { return Vec3{(x + y) / 8.0 - 12, x / 16.0 - 3, 0}; }, true);
+    scene.tolerance_px = 0.02f;
+    EXPECT_EQ(GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share(), 1);
+    scene.expect_true(tolerance_12_bits);
+}
+
+// What a plane's motion must be: the fields enlarged by OpenCV, then one vector for each of the plane's pixels.
+void expect_positions_of_enlarged(const FlowField& base, const FlowField& step, const PlaneGrid& grid,
+                                  double tolerance) {
+    const FlowField large_base = resized(base, grid.frame_width, grid.frame_height);
+    const FlowField large_step = resized(step, grid.frame_width, grid.frame_height);
+    const GroupMotion motion(base, step, grid, 1e-6f);
+    const size_t width = size_t(grid.width());
+    ASSERT_EQ(motion.width(), grid.width());
+    ASSERT_EQ(motion.height(), grid.height());
+    std::vector<float> x(width), y(width);
+    for (int row = 0; row < grid.height(); ++row) {
+        motion.positions(row, 0.25f, x.data(), y.data());
+        for (size_t k = 0; k < width; ++k) {
+            const size_t at = size_t(grid.first_y + grid.step * row) * size_t(grid.frame_width) + size_t(grid.first_x) +
+                              size_t(grid.step) * k;
+            const float u = large_base.u[at] + 0.25f * large_step.u[at],
+                        v = large_base.v[at] + 0.25f * large_step.v[at];
+            ASSERT_NEAR(x[k], float(k) + u / float(grid.step), tolerance) << k << " " << row;
+            ASSERT_NEAR(y[k], float(row) + v / float(grid.step), tolerance) << k << " " << row;
+        }
+    }
+}
+
+FlowField wavy(int width, int height) {
+    FlowField flow(width, height);
+    for (size_t p = 0; p < flow.size(); ++p) {
+        flow.u[p] = float(std::sin(double(p) * 0.7) * 3);
+        flow.v[p] = float(std::cos(double(p) * 1.3) * 2);
+    }
+    return flow;
+}
+
+TEST(GroupMotionOfLowResolution, is_bilinear_in_between_for_frames_and_colours) {
+    for (const int lower : {1, 2, 4})
+        for (const PlaneGrid& grid :
+             {PlaneGrid{104, 48}, PlaneGrid{104, 48, 2, 0, 0}, PlaneGrid{104, 48, 2, 1, 0}, PlaneGrid{104, 48, 2, 0, 1},
+              PlaneGrid{104, 48, 2, 1, 1}, PlaneGrid{8, 4, 2, 1, 1}}) {
+            const FlowField base = wavy(grid.frame_width / lower, grid.frame_height / lower);
+            expect_positions_of_enlarged(base, resized(base, base.width, base.height), grid, 1e-4);
+        }
+}
+
+TEST(GroupMotionOfLowResolution, is_enlarged_first_where_frames_are_no_multiple) {
+    expect_positions_of_enlarged(wavy(34, 17), wavy(34, 17), {67, 33}, 1e-4);
+    expect_positions_of_enlarged(wavy(33, 17), wavy(33, 17), {67, 33, 2, 1, 0}, 1e-4);
+}
+
+// What breaks it: a motion edge finer than the field is smeared over a field's pixel.
+TEST(GroupMotionOfLowResolution, smears_an_edge_over_a_pixel_of_the_field) {
+    FlowField base(16, 4);
+    for (size_t p = 0; p < base.size(); ++p) base.u[p] = p % 16 < 8 ? 0 : 4;
+    const GroupMotion motion(base, FlowField(16, 4), {32, 8});
+    std::vector<float> x(32), y(32);
+    motion.positions(3, 0, x.data(), y.data());
+    EXPECT_EQ(x[14] - 14, 0);
+    EXPECT_EQ(x[15] - 15, 2);
+    EXPECT_EQ(x[16] - 16, 6);
+    EXPECT_EQ(x[17] - 17, 8);
+}
+
 // Colours of a mosaic do not mix: planes of red only show red wherever they are moved from.
 TEST(ColorPlanes, take_every_second_vector_in_their_own_pixels) {
     FlowField flow(5, 4);
@@ -258,6 +355,43 @@ TEST(ColorPlanes, take_every_second_vector_in_their_own_pixels) {
     EXPECT_EQ(plane.height, 2);
     EXPECT_EQ(plane.u, (std::vector<float>{0.5f, 1.5f, 5.5f, 6.5f}));
     EXPECT_EQ(plane.v[3], -6.5f);
+}
+
+// By definition, for each pixel; fields with but one row or column included.
+TEST(Concatenation, is_the_sum_of_a_vector_and_the_bilinear_one_where_it_leads) {
+    for (const auto& [width, height] : {std::pair{37, 11}, {4, 1}, {1, 5}, {2, 2}, {1, 1}}) {
+        FlowField a = wavy(width, height);
+        FlowField b = wavy(width, height);
+        std::reverse(b.u.begin(), b.u.end());
+        a.u[0] = 1e6f, a.v.back() = -1e6f;
+        const FlowField sum = concatenated(a, b), seen = seen_from_target(a, b);
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const size_t p = size_t(y) * size_t(width) + size_t(x);
+                const double px = std::clamp(double(float(x) + a.u[p]), 0.0, width - 1.0);
+                const double py = std::clamp(double(float(y) + a.v[p]), 0.0, height - 1.0);
+                const auto bilinear = [&](const std::vector<float>& plane) {
+                    double value = 0;
+                    for (int j = 0; j < height; ++j)
+                        for (int i = 0; i < width; ++i)
+                            value += std::max(0.0, 1 - std::abs(px - i)) * std::max(0.0, 1 - std::abs(py - j)) *
+                                     double(plane[size_t(j) * size_t(width) + size_t(i)]);
+                    return value;
+                };
+                ASSERT_NEAR(seen.u[p], bilinear(b.u), 1e-4);
+                ASSERT_NEAR(seen.v[p], bilinear(b.v), 1e-4);
+                ASSERT_FLOAT_EQ(sum.u[p], a.u[p] + seen.u[p]);
+                ASSERT_FLOAT_EQ(sum.v[p], a.v[p] + seen.v[p]);
+            }
+    }
+}
+
+TEST(Concatenation, of_a_vector_that_is_no_number_is_none) {
+    FlowField a(8, 2);
+    a.u[5] = NAN;
+    const FlowField sum = concatenated(a, wavy(8, 2));
+    EXPECT_TRUE(std::isnan(sum.u[5]));
+    EXPECT_FALSE(std::isnan(sum.u[4]));
 }
 
 // Rotation about a point, twice: concatenation is the rotation by both angles.
