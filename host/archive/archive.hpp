@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "image/frame.hpp"
+#include "image/plane.hpp"
 #include "image/target_motion.hpp"
 #include "result.hpp"
 #include "stage/lamps.hpp"
@@ -46,7 +47,7 @@ struct Target {
     int width = 0, height = 0;
     Cfa cfa = Cfa::none;  // a mosaic stays a mosaic; Cfa::rgb has three planes a lamp
     // [lamp * planes + plane][y * width + x]; r (white = 1) or stored pixel values
-    std::vector<std::vector<float>> lamps;
+    std::vector<Plane> lamps;
     std::vector<uint32_t> mask;   // [y * width + x], MaskBit
     std::vector<float> variance;  // [y * width + x] of one lamp value, mean over lamps; empty if not known
     // [y * width + x]: noise variance of a lamp value over what it is with no sample masked, mean over lamps; 0 where not

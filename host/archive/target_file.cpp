@@ -266,10 +266,10 @@ Box covering(const Box& box, const Target& head) {
     return {x0, y0, x1 - x0, y1 - y0};
 }
 
-template <typename Sample>
-void crop(std::vector<Sample>& plane, const Box& from, const Box& to) {
+template <typename Samples>
+void crop(Samples& plane, const Box& from, const Box& to) {
     if (from.width == to.width && from.height == to.height) return;
-    std::vector<Sample> cropped(size_t(to.width) * to.height);
+    Samples cropped(size_t(to.width) * to.height);
     for (int y = 0; y < to.height; ++y)
         std::copy_n(plane.data() + size_t(y + to.y - from.y) * from.width + (to.x - from.x), to.width,
                     cropped.data() + size_t(y) * to.width);
@@ -320,7 +320,7 @@ Result<Target> read_target_box(const std::string& path, const TakeInfo& info, Bo
         const Box tiles = covering(box, target);
 
         const auto channels = plane_channels(int(info.lights.size()), target.cfa);
-        target.lamps.assign(channels.size(), std::vector<float>(size_t(tiles.width) * tiles.height));
+        target.lamps.assign(channels.size(), Plane(size_t(tiles.width) * tiles.height));
         Imf::FrameBuffer buffer;
         for (size_t c = 0; c < channels.size(); ++c)
             buffer.insert(channels[c], slice_at(Imf::FLOAT, target.lamps[c].data(), tiles));

@@ -21,7 +21,7 @@ void align_samples(std::span<const float> samples, std::span<int32_t> aligned);
 constexpr float trusted_confidence = 0.5f;
 
 // Where a target's pixels are found at other times, made ready for the colour planes of its frames. What leads outside the
-// image is held at its edge, and not trusted.
+// image takes its edge, and is not trusted.
 class Alignment {
   public:
     // `path` has the target's instant among its knots. line_tolerance_px: GroupMotion's.

@@ -29,20 +29,31 @@ std::vector<PlaneBand> planes_of(const Band& band, Cfa cfa) {
         const ColorPlace& place = places[i];
         if (band.channels == 3 && place.channel != band.channel) continue;
         const auto until = [&](size_t row) { return place.height(int(row)); };  // rows of the plane above a frame's row
-        planes.push_back({place, i, {until(band.first_row), until(band.first_row + band.rows) - until(band.first_row)}});
+        planes.push_back(
+            {place, i, {until(band.first_row), until(band.first_row + band.rows) - until(band.first_row)}});
     }
     return planes;
 }
 
-void warp(const ColorPlanes<int16_t>::Plane& plane, const GroupMotion& motion, float fraction, const RowRange& rows,
-          int16_t* out) {
-    const auto size = size_t(plane.width);
-    warp_counts({plane.samples.data(), plane.width, plane.height, size, 16383}, motion, fraction, rows, out, size);
+// How a source's planes are to be seen.
+struct View {
+    const GroupMotion& motion;
+    float fraction;
+    WarpKernel kernel;
+    int largest;
+};
+
+void warp(const ColorPlanes<int16_t>::Plane& plane, const View& view, const RowRange& rows, int16_t* out) {
+    const auto pitch = size_t(plane.width);
+    const CountPlane source{plane.samples.data(), plane.width, plane.height, pitch, view.largest, true};
+    (view.kernel == WarpKernel::cubic ? warp_counts_cubic : static_cast<decltype(&warp_counts_cubic)>(warp_counts))(
+        source, view.motion, view.fraction, rows, out, pitch);
 }
-void warp(const ColorPlanes<float>::Plane& plane, const GroupMotion& motion, float fraction, const RowRange& rows,
-          float* out) {
-    const auto size = size_t(plane.width);
-    warp_samples({plane.samples.data(), plane.width, plane.height, size}, motion, fraction, rows, out, size);
+void warp(const ColorPlanes<float>::Plane& plane, const View& view, const RowRange& rows, float* out) {
+    const auto pitch = size_t(plane.width);
+    const SamplePlane source{plane.samples.data(), plane.width, plane.height, pitch, true};
+    (view.kernel == WarpKernel::cubic ? warp_samples_cubic : warp_samples)(source, view.motion, view.fraction, rows,
+                                                                           out, pitch);
 }
 
 template <typename Sum, typename Sample>
@@ -51,43 +62,66 @@ Sum rounded(Sample sample) {
     return is_masked(sample) ? masked_sample<Sum> : Sum(sample + std::copysign(Sample(0.5), sample));
 }
 
-// One source's samples of the band.
+// Interleaves the rows of two colour planes, as they lie in a mosaic's row.
 template <typename Sum, typename Sample>
-void warp_band(const typename AlignedRows<Sample, Sum>::Source& source, const Alignment& alignment, const Band& band,
-               const std::vector<PlaneBand>& planes, Sum* out) {
-    if constexpr (std::is_same_v<Sum, Sample>)
-        if (planes.size() == 1)
-            return warp(source.planes->planes[planes[0].plane], alignment.motion(source.place.interval, planes[0].plane),
-                        source.place.fraction, planes[0].rows, out);
-    std::vector<Sample> warped;
-    for (const PlaneBand& part : planes) {
-        const auto& plane = source.planes->planes[part.plane];
-        const auto width = size_t(plane.width), step = size_t(part.place.step);
-        warped.resize(width * size_t(part.rows.count));
-        warp(plane, alignment.motion(source.place.interval, part.plane), source.place.fraction, part.rows,
-             warped.data());
-        for (int y = 0; y < part.rows.count; ++y) {
-            const size_t row = size_t(part.rows.first + y) * step + size_t(part.place.first_y) - band.first_row;
-            Sum* to = out + row * band.width + part.place.first_x;
-            const Sample* from = warped.data() + size_t(y) * width;
-            for (size_t x = 0; x < width; ++x) to[x * step] = rounded<Sum>(from[x]);
-        }
+void interleave(const Sample* even, const Sample* odd, size_t width, Sum* out) {
+    for (size_t x = 0; x < width / 2; ++x) {
+        out[2 * x] = rounded<Sum>(even[x]);
+        out[2 * x + 1] = rounded<Sum>(odd[x]);
     }
+    if (width % 2) out[width - 1] = rounded<Sum>(even[width / 2]);
 }
 
-// The mean of what several sources show, of the samples that are there.
-template <typename Sum, typename Sample>
-void warp_mean(const std::vector<typename AlignedRows<Sample, Sum>::Source>& sources, const Alignment& alignment,
-               const Band& band, const std::vector<PlaneBand>& planes, Sum* out) {
-    std::vector<float> sums(band.samples()), counts(band.samples());
-    for (const auto& source : sources) {
-        warp_band<Sum, Sample>(source, alignment, band, planes, out);
-        for (size_t p = 0; p < band.samples(); ++p)
-            if (!is_masked(out[p])) sums[p] += float(out[p]), ++counts[p];
+// Warps a band of one source after the other.
+template <typename Sample, typename Sum>
+class BandWarp {
+  public:
+    using Rows = AlignedRows<Sample, Sum>;
+    using Source = typename Rows::Source;
+
+    BandWarp(const Rows& rows, const Band& band, Cfa cfa) : rows_(rows), band_(band), parts_(planes_of(band, cfa)) {}
+
+    // `planes` are the source's, or its clipped ones.
+    void warp(const Source& source, const std::vector<typename ColorPlanes<Sample>::Plane>& planes, Sum* out) {
+        if constexpr (std::is_same_v<Sum, Sample>)
+            if (parts_.size() == 1) return warp_part(source, planes, parts_[0], out);
+        warped_.resize(parts_.size());
+        for (size_t i = 0; i < parts_.size(); ++i) {
+            warped_[i].resize(size_t(planes[parts_[i].plane].width) * size_t(parts_[i].rows.count));
+            warp_part(source, planes, parts_[i], warped_[i].data());
+        }
+        if (parts_.size() == 1)
+            std::ranges::transform(warped_[0], out, rounded<Sum, Sample>);
+        else
+            interleave_mosaic(out);
     }
-    for (size_t p = 0; p < band.samples(); ++p)
-        out[p] = counts[p] > 0 ? rounded<Sum>(sums[p] / counts[p]) : masked_sample<Sum>;
-}
+
+  private:
+    void warp_part(const Source& source, const std::vector<typename ColorPlanes<Sample>::Plane>& planes,
+                   const PlaneBand& part, Sample* out) const {
+        ols::warp(planes[part.plane],
+                  {rows_.alignment->motion(source.place.interval, part.plane), source.place.fraction, rows_.kernel,
+                   source.planes->largest},
+                  part.rows, out);
+    }
+
+    void interleave_mosaic(Sum* out) const {
+        const size_t even_width = (band_.width + 1) / 2, odd_width = band_.width / 2;
+        for (size_t parity = 0; parity < 2; ++parity) {  // parts 0 and 1 make the even rows, 2 and 3 the odd ones
+            const PlaneBand& part = parts_[2 * parity];
+            for (size_t y = 0; y < size_t(part.rows.count); ++y) {
+                const size_t row = 2 * (size_t(part.rows.first) + y) + parity - band_.first_row;
+                interleave(&warped_[2 * parity][y * even_width], &warped_[2 * parity + 1][y * odd_width], band_.width,
+                           out + row * band_.width);
+            }
+        }
+    }
+
+    const Rows& rows_;
+    const Band& band_;
+    const std::vector<PlaneBand> parts_;
+    std::vector<std::vector<Sample, PlaneAllocator<Sample>>> warped_;
+};
 
 template <typename Sum>
 void set_black(RowBand<Sum>& loaded, const Band& band, const Frame& like, const Image& black) {
@@ -99,11 +133,6 @@ void set_black(RowBand<Sum>& loaded, const Band& band, const Frame& like, const 
         loaded.black_rest[p] = counts - taken;
         loaded.white[p] = like.white - taken;
     }
-}
-
-template <typename Sum>
-void mark_masked(std::span<const Sum> row, uint8_t reason, std::span<uint8_t> marks) {
-    for (size_t p = 0; p < row.size(); ++p) marks[p] |= is_masked(row[p]) ? reason : uint8_t(0);
 }
 
 }  // namespace
@@ -121,24 +150,32 @@ std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
     return least;
 }
 
-// Marks and masks what a row does not show. A frame that saturates nowhere can lack a sample only where motion led outside.
+// A frame that saturates nowhere can lack a sample only where its motion is not known.
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::mark(size_t row, const Band& band, bool clipped_stay, RowBand<Sum>& loaded,
-                                    std::span<uint8_t> marks) const {
-    std::vector<Sum>& samples = loaded.rows[row];
-    bool saturates = false;
-    for (const Source& source : rows[row]) saturates = saturates || source.planes->any_masked;
-    mark_masked<Sum>(samples, saturates ? mask_saturated : mask_missing, marks);
-    if (rows[row].empty()) return;
-    if (clipped_stay)
-        for (size_t p = 0; p < samples.size(); ++p)
-            if (is_masked(samples[p])) samples[p] = saturates ? Sum(loaded.white[p]) : Sum(0);
-    if (!masks_untrusted) return;
-    for (const Source& source : rows[row]) {
-        const float* trust = alignment->confidence(source.place.interval).data() + band.first_pixel();
-        for (size_t p = 0; p < samples.size(); ++p)
-            if (trust[p] < trusted_confidence) samples[p] = masked_sample<Sum>;
+void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, std::span<Sum> out,
+                                        std::vector<uint8_t>& marks) const {
+    const std::vector<Source>& sources = rows[row];
+    std::vector<float> sums(sources.size() > 1 ? out.size() : 0), counts(sums.size());
+    BandWarp<Sample, Sum> warp(*this, band, cfa);
+    if (sources.empty()) std::ranges::fill(out, masked_sample<Sum>), marks.assign(out.size(), mask_missing);
+    for (const Source& source : sources) {
+        warp.warp(source, source.planes->planes, out.data());
+        if (source.planes->any_masked) {
+            marks.resize(out.size());
+            for (size_t p = 0; p < out.size(); ++p) marks[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
+            if (clipped_stay) warp.warp(source, source.planes->clipped, out.data());
+        }
+        if (masks_untrusted) {
+            const float* trust = alignment->confidence(source.place.interval).data() + band.first_pixel();
+            marks.resize(out.size());
+            for (size_t p = 0; p < out.size(); ++p)
+                if (trust[p] < trusted_confidence) out[p] = masked_sample<Sum>, marks[p] |= mask_misaligned;
+        }
+        for (size_t p = 0; p < sums.size(); ++p)
+            if (!is_masked(out[p])) sums[p] += float(out[p]), ++counts[p];
     }
+    for (size_t p = 0; p < sums.size(); ++p)
+        out[p] = counts[p] > 0 ? rounded<Sum>(sums[p] / counts[p]) : masked_sample<Sum>;
 }
 
 template <typename Sample, typename Sum>
@@ -148,15 +185,10 @@ RowBand<Sum> AlignedRows<Sample, Sum>::load(const Band& band, const Frame& like,
     loaded.rows.resize(rows.size());
     loaded.masked.assign(band.samples(), 0);
     set_black(loaded, band, like, black);
-    const auto planes = planes_of(band, like.cfa);
     std::vector<std::vector<uint8_t>> marks(rows.size());
     for_each_index(threads, rows.size(), [&](size_t row) {
-        auto& out = loaded.rows[row];
-        out.assign(band.samples(), masked_sample<Sum>);
-        if (rows[row].size() == 1) warp_band<Sum, Sample>(rows[row][0], *alignment, band, planes, out.data());
-        if (rows[row].size() > 1) warp_mean<Sum, Sample>(rows[row], *alignment, band, planes, out.data());
-        marks[row].assign(band.samples(), 0);
-        mark(row, band, clipped_stay, loaded, marks[row]);
+        loaded.rows[row].resize(band.samples());
+        load_row(row, band, like.cfa, clipped_stay, loaded.rows[row], marks[row]);
     });
     for (const auto& some : marks)
         for (size_t p = 0; p < some.size(); ++p) loaded.masked[p] |= some[p];

@@ -23,12 +23,14 @@ struct AlignedRows {
     };
     std::vector<std::vector<Source>> rows;  // by basis row; none where it was lost
     std::shared_ptr<const Alignment> alignment;
+    WarpKernel kernel = WarpKernel::bilinear;
     // Whether samples of pixels that are not trusted are masked, for an estimate to fill in. Otherwise they stay as they
     // are: rows that lost a whole group of slots determine no lamp.
     bool masks_untrusted = false;
     int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
 
-    // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` what saturated counts as white.
+    // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` saturated samples count like others,
+    // marked all the same.
     // Marks mask_saturated, and mask_missing where motion led outside the frame or the row was lost.
     RowBand<Sum> load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const;
 
@@ -36,7 +38,9 @@ struct AlignedRows {
     std::vector<float> confidence() const;
 
   private:
-    void mark(size_t row, const Band& band, bool clipped_stay, RowBand<Sum>& loaded, std::span<uint8_t> marks) const;
+    // `marks` stays empty where nothing is masked.
+    void load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, std::span<Sum> out,
+                  std::vector<uint8_t>& marks) const;
 };
 
 }  // namespace ols

@@ -22,7 +22,8 @@ class SampleRow {
     SampleRow(const Frame& frame, int y)
         : bytes_(frame.samples.data() + size_t(y) * frame.pitch_bytes), is_float_(frame.format == PixelFormat::f32) {}
     float at(size_t i) const {
-        return is_float_ ? reinterpret_cast<const float*>(bytes_)[i] : float(reinterpret_cast<const uint16_t*>(bytes_)[i]);
+        return is_float_ ? reinterpret_cast<const float*>(bytes_)[i]
+                         : float(reinterpret_cast<const uint16_t*>(bytes_)[i]);
     }
 
   private:
@@ -30,34 +31,54 @@ class SampleRow {
     bool is_float_;
 };
 
-template <typename Sample>
-void load_plane(const Frame& frame, const Image& black, const ColorPlace& place,
+// Every step-th of `samples`, less black, masked where it is not below white; step is known when compiled, or the loop would
+// not be vectorised.
+template <size_t step, typename Count, typename Sample>
+void subtract_row(const Count* samples, float white, const Sample* black, int width, Sample* out) {
+    if constexpr (std::is_same_v<Count, uint16_t>) {
+        const auto limit = int(std::ceil(std::min(white, 65536.0f)));
+        for (int x = 0; x < width; ++x) {
+            const int counts = samples[size_t(x) * step];
+            out[x] = counts < limit ? Sample(Sample(counts) - black[x]) : masked_sample<Sample>;
+        }
+    } else {
+        for (int x = 0; x < width; ++x) {
+            const float value = samples[size_t(x) * step];
+            out[x] = std::isfinite(value) && value < white ? Sample(value) - black[x] : masked_sample<Sample>;
+        }
+    }
+}
+
+template <typename Count, typename Sample>
+void load_plane(const Frame& frame, float white, const ColorPlace& place, const std::vector<Sample>& black,
                 typename ColorPlanes<Sample>::Plane& plane) {
     const auto channels = size_t(samples_per_pixel(frame.cfa));
-    const size_t step = size_t(place.step) * channels;
-    const size_t first = size_t(place.first_x) * channels + size_t(place.channel);
-    const auto load = [&](const auto* samples, const float* dark, Sample* out) {
-        for (int x = 0; x < plane.width; ++x) {
-            const size_t at = first + size_t(x) * step;
-            const auto counts = float(samples[at]);
-            const bool is_seen = std::isfinite(counts) && counts < frame.white;
-            if constexpr (std::is_same_v<Sample, int16_t>)
-                out[x] = is_seen ? Sample(int(samples[at]) - int(std::lround(dark[at]))) : masked_sample<Sample>;
-            else  // 16-bit counts less whole black, floats less all of it: as row_band.cpp has it
-                out[x] = !is_seen ? masked_sample<Sample>
-                                  : counts - (frame.format == PixelFormat::u16 ? std::round(dark[at]) : dark[at]);
-        }
-    };
     for (int y = 0; y < plane.height; ++y) {
-        const size_t row = size_t(place.first_y + y * place.step);
-        const std::byte* bytes = frame.samples.data() + row * frame.pitch_bytes;
-        const float* dark = black.data.data() + row * frame.width * channels;
-        Sample* out = plane.samples.data() + size_t(y) * size_t(plane.width);
-        if (frame.format == PixelFormat::u16)
-            load(reinterpret_cast<const uint16_t*>(bytes), dark, out);
+        const size_t row = size_t(place.first_y + y * place.step), at = size_t(y) * size_t(plane.width);
+        const auto* samples = reinterpret_cast<const Count*>(frame.samples.data() + row * frame.pitch_bytes) +
+                              size_t(place.first_x) * channels + size_t(place.channel);
+        const auto subtract = [&](auto step) {
+            subtract_row<decltype(step)::value>(samples, white, &black[at], plane.width, &plane.samples[at]);
+        };
+        if (place.step == 2)
+            subtract(std::integral_constant<size_t, 2>());
+        else if (channels == 3)
+            subtract(std::integral_constant<size_t, 3>());
         else
-            load(reinterpret_cast<const float*>(bytes), dark, out);
+            subtract(std::integral_constant<size_t, 1>());
     }
+}
+
+template <typename Sample>
+ColorPlanes<Sample> empty_planes(int width, int height, Cfa cfa) {
+    ColorPlanes<Sample> out;
+    for (const ColorPlace& place : color_places(cfa)) {
+        auto& plane = out.planes.emplace_back();
+        plane.width = place.width(width);
+        plane.height = place.height(height);
+        plane.samples.resize(size_t(plane.width) * size_t(plane.height));
+    }
+    return out;
 }
 
 // Mean over 3 x 3 with weights 1 2 1 across and down, edges mirrored about the outermost pixel, which keeps the mosaic's order.
@@ -80,28 +101,61 @@ std::vector<ColorPlace> color_places(Cfa cfa) {
     }
 }
 
-bool fits_shorts(const Frame& frame, const Image& black) {
+bool fits_shorts(PixelFormat format, float white, const Image& black) {
     const auto [least, most] = std::minmax_element(black.data.begin(), black.data.end());
-    return frame.format == PixelFormat::u16 && frame.white - *least <= largest_short && *most <= largest_short;
+    return format == PixelFormat::u16 && white - *least <= largest_short && *most <= largest_short;
 }
 
 template <typename Sample>
-ColorPlanes<Sample> color_planes(const Frame& frame, const Image& black) {
-    assert((!std::is_same_v<Sample, int16_t> || fits_shorts(frame, black)));
-    ColorPlanes<Sample> out;
-    for (const ColorPlace& place : color_places(frame.cfa)) {
-        auto& plane = out.planes.emplace_back();
-        plane.width = place.width(int(frame.width));
-        plane.height = place.height(int(frame.height));
-        plane.samples.resize(size_t(plane.width) * size_t(plane.height));
-        load_plane<Sample>(frame, black, place, plane);
-        out.any_masked = out.any_masked || std::ranges::any_of(plane.samples, is_masked<Sample>);
+ColorPlanes<Sample> black_planes(const Image& black, Cfa cfa, PixelFormat format) {
+    auto out = empty_planes<Sample>(black.width, black.height, cfa);
+    const auto places = color_places(cfa);
+    for (size_t i = 0; i < places.size(); ++i) {
+        auto& plane = out.planes[i];
+        for (int y = 0; y < plane.height; ++y)
+            for (int x = 0; x < plane.width; ++x) {
+                const float level = black.at(places[i].first_x + x * places[i].step,
+                                             places[i].first_y + y * places[i].step, places[i].channel);
+                plane.samples[size_t(y) * size_t(plane.width) + size_t(x)] =
+                    Sample(format == PixelFormat::u16 ? std::round(level) : level);
+                out.largest = std::max(out.largest, int(std::lround(std::abs(level))));
+            }
     }
     return out;
 }
 
-template ColorPlanes<int16_t> color_planes(const Frame&, const Image&);
-template ColorPlanes<float> color_planes(const Frame&, const Image&);
+template <typename Sample>
+void load_planes(const Frame& frame, float white, const ColorPlanes<Sample>& black,
+                 std::vector<typename ColorPlanes<Sample>::Plane>& planes) {
+    const auto places = color_places(frame.cfa);
+    for (size_t i = 0; i < places.size(); ++i) {
+        if (frame.format == PixelFormat::u16)
+            load_plane<uint16_t>(frame, white, places[i], black.planes[i].samples, planes[i]);
+        else
+            load_plane<float>(frame, white, places[i], black.planes[i].samples, planes[i]);
+    }
+}
+
+template <typename Sample>
+ColorPlanes<Sample> color_planes(const Frame& frame, const ColorPlanes<Sample>& black) {
+    auto out = empty_planes<Sample>(int(frame.width), int(frame.height), frame.cfa);
+    out.largest = std::max(int(std::ceil(std::min(frame.white, 65535.0f))), black.largest);
+    load_planes(frame, frame.white, black, out.planes);
+    for (const auto& plane : out.planes)
+        out.any_masked = out.any_masked || std::ranges::any_of(plane.samples, is_masked<Sample>);
+    if (!out.any_masked) return out;
+    out.clipped = out.planes;
+    load_planes(frame, std::numeric_limits<float>::infinity(), black, out.clipped);
+    if constexpr (std::is_same_v<Sample, int16_t>)  // a sensor may count beyond its white
+        for (auto& plane : out.clipped)
+            for (int16_t& sample : plane.samples) sample = std::min(sample, int16_t(out.largest));
+    return out;
+}
+
+template ColorPlanes<int16_t> black_planes(const Image&, Cfa, PixelFormat);
+template ColorPlanes<float> black_planes(const Image&, Cfa, PixelFormat);
+template ColorPlanes<int16_t> color_planes(const Frame&, const ColorPlanes<int16_t>&);
+template ColorPlanes<float> color_planes(const Frame&, const ColorPlanes<float>&);
 
 Image tracking_image(const Frame& frame, const Image& black, const Image& flat) {
     const int width = int(frame.width), height = int(frame.height), channels = samples_per_pixel(frame.cfa);

@@ -30,14 +30,21 @@ struct ColorPlanes {
     };
     std::vector<Plane> planes;  // by color_places()
     bool any_masked = false;
+    std::vector<Plane> clipped;  // where any is masked: the same, but what saturated is there, a lower bound
+    int largest = 0;             // |sample| at most, of cameras that count
 };
 
-// Whether counts of this frame fit ColorPlanes<int16_t>.
-bool fits_shorts(const Frame& frame, const Image& black);
+// Whether counts up to `white` above this black fit ColorPlanes<int16_t>.
+bool fits_shorts(PixelFormat format, float white, const Image& black);
 
-// masked_sample<Sample> where a sample is at or above white or not finite. For int16_t the frame fits_shorts().
+// What is taken off the samples: of a camera that counts the whole part of black (row_band.hpp), else all of it.
 template <typename Sample>
-ColorPlanes<Sample> color_planes(const Frame& frame, const Image& black);
+ColorPlanes<Sample> black_planes(const Image& black, Cfa cfa, PixelFormat format);
+
+// Samples less `black`, masked_sample<Sample> where one is at or above white or not finite. int16_t only where
+// fits_shorts().
+template <typename Sample>
+ColorPlanes<Sample> color_planes(const Frame& frame, const ColorPlanes<Sample>& black);
 
 // What motion is found in: one channel of counts above black over the flat, so that every pixel of a mosaic counts alike:
 // each is the mean over its neighbourhood of 3 x 3 with weights 1 2 1, in which a quarter is red, a half green, a quarter

@@ -30,7 +30,8 @@ struct Nearest {
 Nearest nearest_of(const Sequence& sequence, uint64_t target, uint64_t slot) {
     const auto length = int64_t(sequence.slots.size());
     const int64_t away = (int64_t(slot) - int64_t(target)) % length;
-    const int64_t after = away < 0 ? away + length : away, before = after - length;  // from the target, before < 0 <= after
+    const int64_t after = away < 0 ? away + length : away,
+                  before = after - length;  // from the target, before < 0 <= after
     const auto number = [&](int64_t distance) -> std::optional<uint64_t> {
         const int64_t at = int64_t(target) + distance;
         if (at < 0 || at >= int64_t(sequence.trigger_count())) return std::nullopt;
@@ -53,9 +54,10 @@ Result<int> tracking_frames_a_target(const Sequence& sequence, double fps) {
     if (every >= 1 && std::abs(every * fps / rate - 1) < 1e-3) return every;
     std::string rates;
     for (const int n : {1, 2, 3, 4, 5, 6, 8, 10}) rates += fmt::format("{}{:.5g}", n > 1 ? ", " : "", rate / n);
-    return fail(fmt::format("{} targets a second: targets stand at tracking frames, of which a second has {:.5g}; there "
-                            "can be {} a second",
-                            fps, rate, rates));
+    return fail(
+        fmt::format("{} targets a second: targets stand at tracking frames, of which a second has {:.5g}; there "
+                    "can be {} a second",
+                    fps, rate, rates));
 }
 
 std::vector<uint64_t> target_numbers(const Sequence& sequence, int every) {

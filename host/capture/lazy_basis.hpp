@@ -30,7 +30,7 @@ std::vector<uint64_t> target_numbers(const Sequence& sequence, int every);
 struct LazyBasis {
     struct Choice {
         uint64_t number = 0;
-        int slot = 0;             // of the cycle
+        int slot = 0;              // of the cycle
         bool is_stand_in = false;  // for a lost one
     };
     uint64_t target = 0;

@@ -102,24 +102,27 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
 
 template <typename Sample, typename Sum>
 AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
-                                                PlanesByNumber<Sample>& known) {
+                                                Ready<Sample>& ready) {
     const Stopwatch watch(times_.planes);
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
     aligned.masks_untrusted = options_.estimate != Estimate::none;
     aligned.threads = options_.threads;
+    aligned.kernel = quality_.kernel;
+    const Frame& like = *frames.frames.front();
+    if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
     std::vector<std::shared_ptr<const ColorPlanes<Sample>>> planes(frames.frames.size());
     for_each_index(options_.threads, planes.size(), [&](size_t i) {
-        const auto found = known.find(frames.basis.choices[i].number);
-        planes[i] =
-            found != known.end()
-                ? found->second
-                : std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*frames.frames[i], calibration_.black));
+        const auto found = ready.planes.find(frames.basis.choices[i].number);
+        if (found != ready.planes.end())
+            planes[i] = found->second;
+        else
+            planes[i] = std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*frames.frames[i], *ready.black));
     });
-    known.clear();
+    ready.planes.clear();
     for (size_t i = 0; i < planes.size(); ++i) {
         const LazyBasis::Choice& choice = frames.basis.choices[i];
-        known[choice.number] = planes[i];
+        ready.planes[choice.number] = planes[i];
         aligned.rows[size_t(sequence_.slots[size_t(choice.slot)].row)].push_back(
             {planes[i], alignment->place_of(middle_tick(*frames.frames[i]))});
     }
@@ -137,12 +140,12 @@ Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames, const M
     }
     AlignedFrames aligned;
     aligned.like = frames.frames.front();
-    if (fits_shorts(like, calibration_.black))
-        aligned.rows = align<int16_t, int16_t>(frames, alignment, short_planes_);
+    if (fits_shorts(like.format, like.white, calibration_.black))
+        aligned.rows = align<int16_t, int16_t>(frames, alignment, ready_shorts_);
     else if (like.format == PixelFormat::u16)
-        aligned.rows = align<float, int32_t>(frames, alignment, float_planes_);
+        aligned.rows = align<float, int32_t>(frames, alignment, ready_floats_);
     else
-        aligned.rows = align<float, float>(frames, alignment, float_planes_);
+        aligned.rows = align<float, float>(frames, alignment, ready_floats_);
     return aligned;
 }
 

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "capture/develop.hpp"
@@ -52,13 +53,17 @@ class MotionDeveloper {
     static double instant_of(const TargetFrames& frames, const Sequence& sequence);
 
   private:
+    // The frames of the last target, ready to be warped.
     template <typename Sample>
-    using PlanesByNumber = std::map<uint64_t, std::shared_ptr<const ColorPlanes<Sample>>>;
+    struct Ready {
+        std::optional<ColorPlanes<Sample>> black;
+        std::map<uint64_t, std::shared_ptr<const ColorPlanes<Sample>>> planes;  // by number
+    };
 
     Result<MotionPath> find_path(const TargetFrames& frames);
     template <typename Sample, typename Sum>
     AlignedRows<Sample, Sum> align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
-                                   PlanesByNumber<Sample>& known);
+                                   Ready<Sample>& ready);
     Result<AlignedFrames> align(const TargetFrames& frames, const MotionPath& path);
 
     const Sequence& sequence_;
@@ -68,8 +73,8 @@ class MotionDeveloper {
     Developer developer_;
     TrackingFlows flows_;
     std::optional<uint64_t> last_tracking_;  // whose image `flows_` has
-    PlanesByNumber<int16_t> short_planes_;
-    PlanesByNumber<float> float_planes_;
+    Ready<int16_t> ready_shorts_;
+    Ready<float> ready_floats_;
     Times times_;
 };
 

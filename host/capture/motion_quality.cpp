@@ -7,17 +7,12 @@ namespace ols {
 namespace {
 
 std::vector<MotionQuality> presets() {
-    const FlowOptions quick{DisFlowOptions{.finest_scale = 1, .patch_stride = 4, .iterations = 12, .refinements = 0}};
-    BroxFlowOptions half, fine;
-    half.finest_level = 1;
-    fine.ratio = 0.8;
-    fine.warps = fine.finest_warps = 3;
-    BroxFlowOptions refine_half = half, refine_fine = fine;
-    refine_half.coarsest = refine_fine.coarsest = 120;  // what a concatenation misses is a few pixels at most
-    return {{},
-            {"preview", true, {.local = quick, .refinement = {}, .reduction = 2}, 0.1f},
-            {"standard", true, {.local = {half}, .refinement = FlowOptions{refine_half}}, 0.02f},
-            {"final", true, {.local = {fine}, .refinement = FlowOptions{refine_fine}}, 0.005f}};
+    const auto method = [](const char* name) { return *flow_method(name); };
+    return {
+        {},
+        {"preview", true, {.local = method("brox-quick"), .refinement = {}, .reduction = 2}, 0.1f},
+        {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}, 0.02f},
+        {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.005f, WarpKernel::cubic}};
 }
 
 }  // namespace

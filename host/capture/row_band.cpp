@@ -56,7 +56,7 @@ void load_frame(const Frame& frame, const Band& band, const std::vector<Sum>& bl
 // The mean of several frames, of the samples that none of them has masked.
 template <typename Sum>
 void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Band& band, const std::vector<Sum>& black,
-               bool clipped_stay, std::vector<Sum>& out, std::vector<uint8_t>& masked) {
+               bool clipped_stay, std::vector<Sum, PlaneAllocator<Sum>>& out, std::vector<uint8_t>& masked) {
     std::vector<float> sums(band.samples()), counts(band.samples());
     for (const auto& frame : frames) {
         load_frame(*frame, band, black, clipped_stay, out.data(), masked.data());
@@ -70,7 +70,7 @@ void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Ba
     if constexpr (std::is_same_v<Sum, int32_t>)
         align_samples(sums, out);
     else
-        out = sums;
+        std::ranges::copy(sums, out.begin());
     for (size_t p = 0; p < out.size(); ++p)
         if (counts[p] == 0) out[p] = masked_sample<Sum>;
 }
@@ -87,7 +87,8 @@ std::vector<Sum*> RowBand<Sum>::pointers() {
 template <typename Sum>
 RowBand<Sum> RecordedRows<Sum>::load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const {
     RowBand<Sum> loaded;
-    loaded.rows.assign(rows.size(), std::vector<Sum>(band.samples()));
+    loaded.rows.resize(rows.size());
+    for (auto& row : loaded.rows) row.resize(band.samples());
     loaded.masked.assign(band.samples(), 0);
     const auto level = prepare_black(loaded, band, black, like.white);
     for (size_t row = 0; row < rows.size(); ++row) {

@@ -8,6 +8,7 @@
 
 #include "archive/archive.hpp"
 #include "image/frame.hpp"
+#include "image/plane.hpp"
 #include "stage/calibration.hpp"
 
 namespace ols {
@@ -27,7 +28,7 @@ struct Band {
 // Sum: int32_t for frames of counts, float for frames of floats.
 template <typename Sum>
 struct RowBand {
-    std::vector<std::vector<Sum>>
+    std::vector<std::vector<Sum, PlaneAllocator<Sum>>>
         rows;  // [basis row][sample], counts above black; masked_sample<Sum> where there is none
     // Of each sample: MaskBit of what was left out of it, in any row (mask_saturated, mask_missing); 0 where all is there.
     std::vector<uint8_t> masked;

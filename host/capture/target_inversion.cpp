@@ -7,13 +7,16 @@
 
 #include "reflectance/demultiplex.hpp"
 #include "reflectance/estimate_bound.hpp"
+#include "reflectance/variance.hpp"
 #include "stage/playback.hpp"
 
 namespace ols {
 
 namespace {
 
-constexpr size_t band_samples = 1 << 16;  // of one plane; 159 rows of these are 42 MB
+// Of one plane: 159 rows of these are 5 MB in integers of 32 bits. Whole pixel rows, two at least so that a mosaic's colours are all
+// there; short enough that memory is used again and again, and what was loaded is near when it is inverted.
+constexpr size_t band_samples = 1 << 13;
 
 const char* estimate_name(Estimate estimate) {
     return estimate == Estimate::smooth ? "smooth" : "nonnegative";
@@ -63,7 +66,8 @@ class TargetInversion {
           noise_(job.noise),
           fills_(job.fills),
           estimate_(job.estimate),
-          threads_(job.threads) {
+          threads_(job.threads),
+          variance_(job.basis, job.noise) {
         weight_sums_.resize(size_t(basis_.images()));
         for (int row = 0; row < basis_.rows; ++row)
             for (int image = 0; image < basis_.images(); ++image)
@@ -75,11 +79,12 @@ class TargetInversion {
         target_.height = int(like_.height);
         target_.cfa = like_.cfa;
         const size_t pixels = size_t(like_.width) * like_.height;
-        target_.lamps.assign(size_t(basis_.images() * target_.planes()), std::vector<float>(pixels));
+        target_.lamps.resize(size_t(basis_.images() * target_.planes()));
+        for (Plane& lamp : target_.lamps) lamp = Plane(pixels);
         target_.mask.assign(pixels, 0);
         if (like_.format == PixelFormat::u16) target_.variance.assign(pixels, 0);
         if (!fills_) target_.missing_lamps = empty_rows(rows_.rows);
-        const size_t band_rows = std::max<size_t>(1, band_samples / like_.width);
+        const size_t band_rows = std::max<size_t>(2, band_samples / like_.width / 2 * 2);
         for (size_t y = 0; y < like_.height; y += band_rows)
             for (int channel = 0; channel < target_.planes(); ++channel) {
                 const Band band{y, std::min(band_rows, like_.height - y), like_.width, channel, target_.planes()};
@@ -95,9 +100,8 @@ class TargetInversion {
     void load_and_invert(const Band& band) {
         RowBand<Sum> loaded = rows_.load(band, like_, calibration_.black, !fills_);
         if constexpr (std::is_same_v<Sum, int16_t>)
-            invert_band(band, widened(loaded));
-        else
-            invert_band(band, std::move(loaded));
+            if (needs_filling(loaded)) return invert_band(band, widened(loaded));
+        invert_band(band, std::move(loaded));
     }
 
     template <typename Count>
@@ -113,15 +117,20 @@ class TargetInversion {
                     {.gain = gain_, .threads = threads_});
         subtract_black_rest(loaded.black_rest, lamps);
         std::vector<float> variance;
-        if constexpr (std::is_same_v<Count, int32_t>) {
+        if constexpr (!std::is_same_v<Count, float>) {
             variance.resize(band.samples());
-            estimate_variance(basis_, inputs, band.samples(), noise_, gain_, variance.data());
+            variance_.estimate(inputs, band.samples(), gain_, variance.data());
         }
         if (!sample_fills_.empty()) note_fills(band, lamps, variance);
         for (size_t p = 0; p < band.samples(); ++p) target_.mask[band.first_pixel() + p] |= loaded.masked[p];
         // Of the colours of a pixel, their mean.
         for (size_t p = 0; p < variance.size(); ++p)
             target_.variance[band.first_pixel() + p] += variance[p] / float(target_.planes());
+    }
+
+    template <typename Count>
+    bool needs_filling(const RowBand<Count>& loaded) const {
+        return fills_ && std::ranges::any_of(loaded.masked, [](uint8_t mark) { return mark != 0; });
     }
 
     // gain = 1 / (F t) for each sample of the band.
@@ -138,12 +147,13 @@ class TargetInversion {
     void fill(const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
         sample_fills_.clear();
         for (const int row : target_.missing_lamps) std::fill_n(rows[size_t(row)], loaded.masked.size(), Count(0));
-        if (!fills_ || std::ranges::all_of(loaded.masked, [](uint8_t mark) { return mark == 0; })) return;
+        if (!needs_filling(loaded)) return;
         sample_fills_.resize(loaded.masked.size());
         lost_.assign(rows.size(), 0);
         for (const int row : empty_rows(rows_.rows)) lost_[size_t(row)] = 1;
         const RowFiller filler(fills_(), {loaded.black_rest, loaded.white, lost_, noise_}, sample_fills_);
-        fill_rows(filler, rows, loaded.masked);
+        if constexpr (!std::is_same_v<Count, int16_t>)
+            fill_rows(filler, rows, loaded.masked);  // load_and_invert() widened
     }
 
     void subtract_black_rest(const std::vector<float>& rest, const std::vector<float*>& lamps) {
@@ -186,6 +196,7 @@ class TargetInversion {
     const std::function<FillCache&()> fills_;
     const Estimate estimate_;
     const int threads_;
+    const VarianceEstimate variance_;
     std::vector<double> weight_sums_;  // of each image over all rows: what a constant in all rows becomes
     Target target_;
     MaskTally tally_;

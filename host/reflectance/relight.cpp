@@ -59,7 +59,7 @@ class Relighter {
     }
 
   private:
-    const std::vector<float>& plane(int lamp, int output) const {
+    const Plane& plane(int lamp, int output) const {
         return olat_.planes[size_t(lamp) * olat_.planes_per_lamp() + (olat_.cfa == Cfa::rgb ? output : 0)];
     }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "image/frame.hpp"
+#include "image/plane.hpp"
 #include "reflectance/lamp_weights.hpp"
 #include "result.hpp"
 
@@ -17,7 +18,7 @@ namespace ols {
 struct OlatImages {
     int width = 0, height = 0;
     Cfa cfa = Cfa::none;
-    std::span<const std::vector<float>> planes;
+    std::span<const Plane> planes;
 
     int planes_per_lamp() const { return cfa == Cfa::rgb ? 3 : 1; }
     int lamps() const { return int(planes.size()) / planes_per_lamp(); }

@@ -135,14 +135,15 @@ HWY_INLINE bool find_sources(const CountPlane& source, const GroupMotion& motion
     const hn::CappedTag<float, at_once> df;
     const hn::RebindToSigned<decltype(df)> di;
     const hn::Rebind<int16_t, decltype(df)> d16;
+    const bool holds = source.holds_edges;
     const auto part = [&](auto coordinate, int size, int16_t* whole, int16_t* weight) HWY_ATTR {
         const auto held = hn::Min(hn::Max(coordinate, hn::Zero(df)), hn::Set(df, float(size - 1)));
         const auto at_pixel = hn::ConvertTo(di, held);
         const auto rest = hn::Sub(held, hn::ConvertTo(df, at_pixel));
         hn::StoreU(hn::DemoteTo(d16, at_pixel), d16, whole);
         const auto units = hn::NearestInt(hn::Mul(rest, hn::Set(df, float(1 << one_log2))));
-        hn::StoreU(hn::DemoteTo(d16, units), d16, weight);  // saturates
-        return hn::Not(hn::Eq(held, coordinate));           // NaN is outside, too
+        hn::StoreU(hn::DemoteTo(d16, units), d16, weight);              // saturates
+        return hn::Not(hn::Eq(holds ? coordinate : held, coordinate));  // NaN is outside, too
     };
     const GroupMotion::Lines& lines = motion.lines();
     const size_t at = size_t(y) * size_t(motion.runs()) + size_t(run);

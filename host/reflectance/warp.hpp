@@ -8,12 +8,16 @@
 
 namespace ols {
 
+// How samples between pixels come about: bilinear means, or cubic convolution, which is sharper and slower.
+enum class WarpKernel { bilinear, cubic };
+
 // One colour plane of a frame: counts above black, masked_sample<int16_t> where there is none. Pitch in samples.
 struct CountPlane {
     const int16_t* counts = nullptr;
     int width = 0, height = 0;
     size_t pitch = 0;
-    int largest = 4095;  // |count| at most: up to 4095 two more bits are kept while interpolating
+    int largest = 4095;        // |count| at most: up to 4095 two more bits are kept while interpolating
+    bool holds_edges = false;  // a position outside takes the nearest count of the edge
 };
 
 struct RowRange {
@@ -22,7 +26,7 @@ struct RowRange {
 
 // The rows of `range` of the slot at a fraction of the group's step: 0 at the tracking frame nearer to the target.
 // out[(y - range.first) * out_pitch + x] = the bilinear mean of the four counts around the position, rounded. A position outside
-// the plane, or one of whose counts with a weight above zero is masked, is masked. |counts| <= 16383; up to 4095 interpolation
+// the plane (unless it holds its edges), or one of whose counts with a weight above zero is masked, is masked. |counts| <= 16383; up to 4095 interpolation
 // keeps two more bits. Integer arithmetic but for the position: the same bits on every SIMD path and for any range. Where the
 // position is on a line it is within 2^-11 pixels of it.
 void warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
@@ -35,11 +39,20 @@ struct SamplePlane {
     const float* samples = nullptr;
     int width = 0, height = 0;
     size_t pitch = 0;
+    bool holds_edges = false;
 };
 
 // The same for such samples, not rounded, by the same rules: a position outside the plane, or one of whose samples with a weight
 // above zero is not finite, becomes NaN; a whole position is its sample's bits.
 void warp_samples(const SamplePlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                   float* out, size_t out_pitch);
+
+// The same by cubic convolution (Keys 1981, a = -1/2) of sixteen counts, in float, rounded to the nearest: sharper, as it is exact
+// for quadratics where bilinear means are for planes, and several times slower. Where one of the outer counts is masked or lies
+// outside, bilinear or with the edge's count. The same bits on every SIMD path and for any range.
+void warp_counts_cubic(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                       int16_t* out, size_t out_pitch);
+void warp_samples_cubic(const SamplePlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
+                        float* out, size_t out_pitch);
 
 }  // namespace ols

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The warp of samples that no camera has quantised: plain bilinear interpolation in float.
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <vector>
@@ -17,6 +18,10 @@ float lerp(float a, float b, float weight) {
 }
 
 float sample_at(const SamplePlane& source, float x, float y) {
+    if (source.holds_edges && !std::isnan(x) && !std::isnan(y)) {
+        x = std::clamp(x, 0.0f, float(source.width - 1));
+        y = std::clamp(y, 0.0f, float(source.height - 1));
+    }
     if (!(x >= 0 && y >= 0 && x <= float(source.width - 1) && y <= float(source.height - 1)))
         return masked_sample<float>;
     const int left = int(x), above = int(y);

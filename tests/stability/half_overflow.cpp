@@ -22,7 +22,7 @@ constexpr float largest_half = 65504;
 Target overflowing_target() {
     Target target;
     target.width = std::size(beyond), target.height = 1;
-    target.lamps = {{std::begin(beyond), std::end(beyond)}, std::vector<float>(std::size(beyond), 0.5f)};
+    target.lamps = {{std::begin(beyond), std::end(beyond)}, Plane(std::size(beyond), 0.5f)};
     target.mask.resize(std::size(beyond));
     return target;
 }
@@ -40,7 +40,7 @@ Target through_archive(const Target& target) {
 }
 
 // Pixels of a picture under the second lamp alone that are not finite.
-int poisoned(const std::vector<std::vector<float>>& lamps) {
+int poisoned(const std::vector<Plane>& lamps) {
     constexpr float weights[] = {0, 1};
     int count = 0;
     for (size_t p = 0; p < lamps[0].size(); ++p)

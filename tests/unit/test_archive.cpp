@@ -113,7 +113,7 @@ TEST_F(Archive, what_half_floats_cannot_hold_is_clamped_and_masked_and_never_inf
     target.mask = {mask_saturated, 0, 0, 0};
     ASSERT_TRUE(writer->write_target(target).ok());
     const auto back = ArchiveReader::open(path)->read_target(0, 0);
-    EXPECT_EQ(back->lamps[0], (std::vector<float>{65504, -65504, 0, 65504}));
+    EXPECT_EQ(back->lamps[0], (Plane{65504, -65504, 0, 65504}));
     EXPECT_EQ(back->mask, (std::vector<uint32_t>{mask_saturated | mask_clamped, mask_clamped, mask_clamped, 0}));
 }
 
