@@ -14,6 +14,7 @@ from pathlib import Path
 
 import bases
 import checks
+import moving
 import noise
 import numpy as np
 from session import BIN, ROOT, Clock, VirtualStage, run, run_json, use_root
@@ -25,6 +26,7 @@ CARD_REFLECTANCE = 0.985
 # Of .cache/assets/env: exposure in stops, turn about the vertical in degrees.
 ENVIRONMENTS = {"courtyard": (0.2, 0), "city": (0.4, 0), "sunset": (1.3, 120)}
 TRUTH_ENVIRONMENT = "sunset"
+MOVING_ENVIRONMENT = "sunset"
 COMPARED = ["single", "hadamard156"]  # bases whose pictures are held against the truth
 OTHERS = ["triangle", "triangle300", "planes156", "s155", "paley163", "spherical_harmonics:10"]  # recorded by name, without a sequence file
 SHOWN = "s159"  # the basis of the take that is shown
@@ -99,6 +101,17 @@ class Demo:
             for name, (stops, degrees) in ENVIRONMENTS.items():
                 run(BIN / "rf", "relight", take, "--env", environment(name), "--exposure", stops, "--rotate", degrees,
                     "-o", self.out / f"relit_{name}.exr", "--png", self.out / f"relit_{name}.png")
+
+    def move(self):
+        """A moving head, with motion compensation and without."""
+        light = ["--env", environment(MOVING_ENVIRONMENT), "--rotate", ENVIRONMENTS[MOVING_ENVIRONMENT][1]]
+        takes = moving.record(self.clock, self.out)
+        films = moving.film(self.clock, self.out, light)
+        moving.animate(films, self.out / "moving.gif")
+        figures = moving.compare(self.clock, self.out, light)
+        for quality, take in takes.items():
+            figures[f"moving_slots_missing_{quality}"] = take["slots_missing"]
+        return figures
 
     def compare(self):
         """Relit takes against the virtual stage's own rendering under the same light."""
@@ -186,13 +199,13 @@ def main():
         demo.record(model)
     demo.record_others()
     demo.show()
-    report = {**demo.check(), **demo.compare(), "noise": demo.predict_noise()}
+    report = {**demo.check(), **demo.compare(), **demo.move(), "noise": demo.predict_noise()}
     report["seconds"] = round(demo.clock.total(), 1)
     report["seconds_by_step"] = demo.clock.steps
     (out / "report.json").write_text(json.dumps(report, indent=1) + "\n")
     (out / "report.txt").write_text(text_report(report))
     print(text_report(report))
-    print(f"Look at {options.out}/contact-sheet.png and {options.out}/relit_*.png")
+    print(f"Look at {options.out}/contact-sheet.png, {options.out}/relit_*.png and {options.out}/moving.gif")
 
 
 if __name__ == "__main__":
