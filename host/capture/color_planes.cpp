@@ -179,4 +179,25 @@ Image tracking_image(const Frame& frame, const Image& black, const Image& flat) 
     return is_mosaic ? smoothed_mosaic(image) : image;
 }
 
+Image tracking_noise(const Frame& frame, const Image& black, const Image& flat, const NoiseModel& noise) {
+    const int width = int(frame.width), height = int(frame.height), channels = samples_per_pixel(frame.cfa);
+    Image sigma(width, height, 1);
+    if (frame.format == PixelFormat::f32) return sigma;
+    for (int y = 0; y < height; ++y) {
+        const SampleRow row(frame, y);
+        for (int x = 0; x < width; ++x) {
+            double variance = 0, weights = 0;
+            for (int c = 0; c < channels; ++c) {
+                const double counts = row.at(size_t(x) * size_t(channels) + size_t(c)) - black.at(x, y, c),
+                             deviation = noise.read_counts + noise.shot * std::sqrt(std::max(counts, 0.0)),
+                             weight = channels == 3 && c == 1 ? 2 : 1, part = weight * deviation / flat.at(x, y, c);
+                variance += part * part;
+                weights += weight;
+            }
+            sigma.at(x, y) = float(std::sqrt(variance) / weights);
+        }
+    }
+    return sigma;
+}
+
 }  // namespace ols

@@ -6,6 +6,7 @@
 
 #include "image/frame.hpp"
 #include "reflectance/warp.hpp"
+#include "stage/stage.hpp"
 
 namespace ols {
 
@@ -51,5 +52,10 @@ ColorPlanes<Sample> color_planes(const Frame& frame, const ColorPlanes<Sample>& 
 // blue wherever it lies. Monochrome frames pass unsmoothed, rgb becomes (R + 2 G + B) / 4. NaN where a sample of it is
 // saturated or not finite.
 Image tracking_image(const Frame& frame, const Image& black, const Image& flat);
+
+// The standard deviation of its noise: that of independent samples, even where a mosaic's are smoothed (noise that is averaged
+// over several pixels comes out the same, but for the smoothing's own width). 0 for frames of floats, which come from a camera
+// without noise.
+Image tracking_noise(const Frame& frame, const Image& black, const Image& flat, const NoiseModel& noise);
 
 }  // namespace ols

@@ -53,6 +53,7 @@ MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibrati
                                  const NoiseModel& noise, DevelopOptions options, MotionQuality quality)
     : sequence_(sequence),
       calibration_(calibration),
+      noise_(noise),
       options_(options),
       quality_(std::move(quality)),
       developer_(sequence, calibration, noise, std::move(options)),
@@ -78,12 +79,14 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
     std::vector<const TargetFrames::Tracking*> fresh;
     for (const auto& one : frames.tracking)
         if (!last_tracking_ || one.number > *last_tracking_) fresh.push_back(&one);
-    std::vector<Image> images(fresh.size());
+    std::vector<Image> images(fresh.size()), noise(fresh.size());
     for_each_index(options_.threads, fresh.size(), [&](size_t i) {
         images[i] = tracking_image(*fresh[i]->frame, calibration_.black, calibration_.flat);
+        noise[i] = tracking_noise(*fresh[i]->frame, calibration_.black, calibration_.flat, noise_);
     });
     for (size_t i = 0; i < fresh.size(); ++i) {
-        if (Status added = flows_.add(middle_tick(*fresh[i]->frame), images[i]); !added.ok()) return added.error();
+        const Status added = flows_.add(middle_tick(*fresh[i]->frame), images[i], noise[i]);
+        if (!added.ok()) return added.error();
         last_tracking_ = fresh[i]->number;
     }
     double from = middle_tick(*frames.frames.front()), to = from;

@@ -49,6 +49,13 @@ class MotionDeveloper {
     };
     const Times& times() const { return times_; }
 
+    // What is held for later targets.
+    struct Kept {
+        size_t basis_frames = 0;     // as planes
+        size_t tracking_frames = 0;  // with their flows
+    };
+    Kept kept() const { return {short_planes_.size() + float_planes_.size(), flows_.frames()}; }
+
     // The middle of the target's tracking exposure, in ticks; where that frame was lost, by its neighbours' word.
     static double instant_of(const TargetFrames& frames, const Sequence& sequence);
 
@@ -68,6 +75,7 @@ class MotionDeveloper {
 
     const Sequence& sequence_;
     const CameraCalibration& calibration_;
+    const NoiseModel noise_;
     const DevelopOptions options_;
     const MotionQuality quality_;
     Developer developer_;

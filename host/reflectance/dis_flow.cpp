@@ -80,6 +80,22 @@ void refine(const cv::Mat& from, const cv::Mat& to, const DisFlowOptions& option
     refinement->calcUV(from, to, u, v);
 }
 
+// DIS knows no masks: what is not seen moves as the nearest pixel that is.
+void follow_seen(const Image& seen, FlowField& flow) {
+    if (seen.data.empty()) return;
+    cv::Mat unseen(seen.height, seen.width, CV_8U), distance, nearest;
+    for (int y = 0; y < seen.height; ++y)
+        for (int x = 0; x < seen.width; ++x) unseen.at<uint8_t>(y, x) = seen.at(x, y) == 0;
+    cv::distanceTransform(unseen, distance, nearest, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
+    std::vector<size_t> place(flow.size() + 1, flow.size());  // of the seen pixel of each label
+    for (size_t p = 0; p < flow.size(); ++p)
+        if (unseen.data[p] == 0) place[size_t(nearest.ptr<int>()[p])] = p;
+    for (size_t p = 0; p < flow.size(); ++p) {
+        const size_t from = place[size_t(nearest.ptr<int>()[p])];
+        if (unseen.data[p] != 0 && from < flow.size()) flow.u[p] = flow.u[from], flow.v[p] = flow.v[from];
+    }
+}
+
 }  // namespace
 
 FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
@@ -89,6 +105,7 @@ FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const Fl
                      : initial      ? *initial
                                     : FlowField(from.cols, from.rows);
     if (options.final_refinements > 0) refine(from, to, options, flow);
+    follow_seen(pair.from_seen, flow);
     return flow;
 }
 

@@ -70,7 +70,7 @@ TrackingFlows::TrackingFlows(TrackingFlowOptions options) : options_(std::move(o
     assert(options_.reduction == 1 || options_.reduction == 2 || options_.reduction == 4);
 }
 
-Status TrackingFlows::add(double tick, const Image& image) {
+Status TrackingFlows::add(double tick, const Image& image, const Image& sigma) {
     assert(image.channels == 1 && (frames_.empty() || tick > frames_.back().tick));
     Image small = shrunk(image, options_.reduction);
     if (frames_.empty()) width_ = small.width, height_ = small.height;
@@ -79,7 +79,15 @@ Status TrackingFlows::add(double tick, const Image& image) {
         return fail("frames of " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                     " pixels are too small for motion compensation: at least " +
                     std::to_string(16 * options_.reduction) + " a side");
-    frames_.push_back({tick, std::move(small), {}, {}});
+    Frame frame{tick, std::move(small), {}, {}, {}};
+    if (!sigma.data.empty()) {
+        assert(sigma.width == image.width && sigma.height == image.height);
+        Image noise = shrunk(sigma, options_.reduction);
+        for (float& v : noise.data) v /= float(options_.reduction);  // of a mean over reduction^2 pixels
+        frame.evenness = evenness_of(frame.image, noise);
+        frame.image = without_even_parts(frame.image, *frame.evenness);
+    }
+    frames_.push_back(std::move(frame));
     return Done{};
 }
 
@@ -109,12 +117,17 @@ Status TrackingFlows::find_local_flows(size_t first, size_t last) {
     return first_error(errors);
 }
 
-// Adds the knots from frame `at`, where `flow` leads and `back` comes from, to frame `end`. `reference` is the image that
-// long-range flows are refined against, null where there is none.
-Status TrackingFlows::walk(const Image* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
+// Adds the knots from frame `at`, where `flow` leads and `back` comes from, to frame `end`. `reference` is the instant's own
+// frame, which long-range flows are refined against, null where there is none.
+Status TrackingFlows::walk(const Frame* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
                            MotionPath& path) const {
     for (;;) {
-        path.push_back({frames_[at].tick, flow, confidence(flow, back), false});
+        const Frame& here = frames_[at];
+        path.push_back({here.tick, flow,
+                        reference && reference->evenness && here.evenness
+                            ? confidence(flow, back, *reference->evenness, *here.evenness)
+                            : confidence(flow, back),
+                        false});
         if (at == end) return Done{};
         const Frame& pair = frames_[direction > 0 ? at : at - 1];
         const FlowField &away = *(direction > 0 ? pair.forward : pair.backward),
@@ -123,7 +136,7 @@ Status TrackingFlows::walk(const Image* reference, int direction, size_t end, si
         back = concatenated(home, back);
         at = direction > 0 ? at + 1 : at - 1;
         if (!reference || !options_.refinement) continue;
-        auto refined = estimate_flow(*reference, frames_[at].image, *options_.refinement, &flow);
+        auto refined = estimate_flow(reference->image, frames_[at].image, *options_.refinement, &flow);
         if (!refined.ok()) return refined.error();
         flow = std::move(*refined);
     }
@@ -146,7 +159,7 @@ Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
     last = std::max(last, is_frame ? before : before + 1);
     if (Status status = find_local_flows(first, last); !status.ok()) return status.error();
 
-    const Image* const reference = is_frame ? &frames_[before].image : nullptr;
+    const Frame* const reference = is_frame ? &frames_[before] : nullptr;
     SplitFlow parts;
     double share = 0;
     if (!is_frame) {
@@ -155,8 +168,8 @@ Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
     }
     MotionPath sides[2];
     std::string errors[2];
-    const auto take = [&](size_t side, const Image* image, size_t end, size_t at, FlowField flow, FlowField back) {
-        const Status walked = walk(image, side == 0 ? -1 : 1, end, at, std::move(flow), std::move(back), sides[side]);
+    const auto take = [&](size_t side, const Frame* own, size_t end, size_t at, FlowField flow, FlowField back) {
+        const Status walked = walk(own, side == 0 ? -1 : 1, end, at, std::move(flow), std::move(back), sides[side]);
         if (!walked.ok()) errors[side] = walked.error().message;
     };
     for_each_index(options_.threads, 2, [&](size_t side) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "reflectance/evenness.hpp"
 #include "reflectance/flow.hpp"
 #include "result.hpp"
 
@@ -26,7 +27,7 @@ struct TrackingFlowOptions {
 struct MotionKnot {
     double tick = 0;
     FlowField flow;
-    std::vector<float> confidence;  // of each pixel (flow.hpp, confidence())
+    std::vector<float> confidence;  // of each pixel (flow.hpp, or evenness.hpp where noise is known)
     bool is_instant = false;        // the instant itself
 };
 
@@ -40,12 +41,15 @@ class TrackingFlows {
   public:
     explicit TrackingFlows(TrackingFlowOptions options);
 
-    // One channel, all of one size, at least 16 * reduction pixels a side, NaN where nothing was seen. Ticks ascend.
+    // One channel, all of one size, at least 16 * reduction pixels a side, NaN where nothing was seen. Ticks ascend. `sigma`: the
+    // standard deviation of each pixel's noise, the same size; what shows nothing above it is left to its surroundings.
+    // Empty: not known.
     // Error: another size than before, or too small.
-    Status add(double tick, const Image& image);
+    Status add(double tick, const Image& image, const Image& sigma = {});
 
     // Drops the tracking frames before the last one at or before `tick`.
     void forget_before(double tick);
+    size_t frames() const { return frames_.size(); }  // that are kept
 
     // From the instant to the tracking frames from the last at or before `from` to the first at or after `to`, as far as
     // there are any. The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to
@@ -57,11 +61,12 @@ class TrackingFlows {
     struct Frame {
         double tick;
         Image image;
+        std::optional<Evenness> evenness;
         std::optional<FlowField> forward, backward;  // to the next frame, and from there
     };
 
     Status find_local_flows(size_t first, size_t last);
-    Status walk(const Image* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
+    Status walk(const Frame* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
                 MotionPath& path) const;
 
     const TrackingFlowOptions options_;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// A periodic texture over several tracking frames: the far ones look the same shifted by whole periods.
+// links: ols_capture
+#include "hard_case.hpp"
+#include "moving_take.hpp"
+
+using namespace ols;
+using namespace ols::moving;
+
+namespace {
+
+constexpr double period_px = 12, px_a_frame = 2.5;  // of tracking frames
+
+Albedo periodic() {
+    return [](double x, double y) {
+        return 0.5 + 0.2 * (std::sin(2 * M_PI * x / period_px) + std::sin(2 * M_PI * y / period_px));
+    };
+}
+
+double mean_error(const FlowField& flow, double truth) {
+    double sum = 0, count = 0;
+    for (int y = 20; y < flow.height - 20; ++y)
+        for (int x = 30; x < flow.width - 30; ++x) {
+            const size_t at = size_t(y) * size_t(flow.width) + size_t(x);
+            sum += std::hypot(double(flow.u[at]) - truth, double(flow.v[at])), ++count;
+        }
+    return sum / count;
+}
+
+}  // namespace
+
+// Bound: half a pixel, what flow may be off by. From one tracking frame to the next the texture moves by less than half a
+// period, where the nearest match is the right one; all that follows begins within half a period of the truth.
+TEST(PeriodicTexture, is_followed_over_a_period_and_more) {
+    Take take({.layers = {{periodic(), INFINITY,
+                           [](double slots) {
+                               return Offset{px_a_frame * slots / 18, 0};
+                           }}}},
+              "single");
+    const uint64_t target = take.middle_target();
+    const Image black = take.calibration().black, flat = take.calibration().flat;
+    const auto image = [&](uint64_t number) { return tracking_image(*take.frame(number), black, flat); };
+    for (const char* quality : {"standard", "preview"}) {
+        const TrackingFlowOptions options = motion_quality(quality)->flow;
+        TrackingFlows flows(options);
+        for (uint64_t number = target; number <= target + 90; number += 18)
+            ASSERT_TRUE(flows.add(take.time_of(number), image(number)).ok());
+        const double instant = take.time_of(target), truth = 5 * px_a_frame / options.reduction;
+        const MotionPath path = *flows.path(instant, instant, instant + 90);
+        const double ours = mean_error(path.back().flow, truth);
+        const double naive =
+            mean_error(*estimate_flow(image(target), image(target + 90), options.local), 5 * px_a_frame);
+        if (quality == std::string("standard"))
+            expect_within(
+                "a texture of 12 px period moved by 12.5 px over five tracking frames, at once or frame by frame: mean "
+                "endpoint error",
+                naive, ours, 0.5, "px");
+        else
+            EXPECT_LT(ours, period_px / 2 / options.reduction);
+    }
+}
