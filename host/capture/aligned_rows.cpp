@@ -35,25 +35,16 @@ std::vector<PlaneBand> planes_of(const Band& band, Cfa cfa) {
     return planes;
 }
 
-// How a source's planes are to be seen.
-struct View {
-    const GroupMotion& motion;
-    float fraction;
-    WarpKernel kernel;
-    int largest;
-};
-
-void warp(const ColorPlanes<int16_t>::Plane& plane, const View& view, const RowRange& rows, int16_t* out) {
+void warp(const ColorPlanes<int16_t>::Plane& plane, int largest, const GroupMotion& motion, float fraction,
+          const RowRange& rows, int16_t* out) {
     const auto pitch = size_t(plane.width);
-    const CountPlane source{plane.samples.data(), plane.width, plane.height, pitch, view.largest, true};
-    (view.kernel == WarpKernel::cubic ? warp_counts_cubic : static_cast<decltype(&warp_counts_cubic)>(warp_counts))(
-        source, view.motion, view.fraction, rows, out, pitch);
+    warp_counts({plane.samples.data(), plane.width, plane.height, pitch, largest, true}, motion, fraction, rows, out,
+                pitch);
 }
-void warp(const ColorPlanes<float>::Plane& plane, const View& view, const RowRange& rows, float* out) {
+void warp(const ColorPlanes<float>::Plane& plane, int, const GroupMotion& motion, float fraction, const RowRange& rows,
+          float* out) {
     const auto pitch = size_t(plane.width);
-    const SamplePlane source{plane.samples.data(), plane.width, plane.height, pitch, true};
-    (view.kernel == WarpKernel::cubic ? warp_samples_cubic : warp_samples)(source, view.motion, view.fraction, rows,
-                                                                           out, pitch);
+    warp_samples({plane.samples.data(), plane.width, plane.height, pitch, true}, motion, fraction, rows, out, pitch);
 }
 
 template <typename Sum, typename Sample>
@@ -99,10 +90,8 @@ class BandWarp {
   private:
     void warp_part(const Source& source, const std::vector<typename ColorPlanes<Sample>::Plane>& planes,
                    const PlaneBand& part, Sample* out) const {
-        ols::warp(planes[part.plane],
-                  {rows_.alignment->motion(source.place.interval, part.plane), source.place.fraction, rows_.kernel,
-                   source.planes->largest},
-                  part.rows, out);
+        ols::warp(planes[part.plane], source.planes->largest,
+                  rows_.alignment->motion(source.place.interval, part.plane), source.place.fraction, part.rows, out);
     }
 
     void interleave_mosaic(Sum* out) const {

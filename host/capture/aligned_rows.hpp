@@ -23,7 +23,6 @@ struct AlignedRows {
     };
     std::vector<std::vector<Source>> rows;  // by basis row; none where it was lost
     std::shared_ptr<const Alignment> alignment;
-    WarpKernel kernel = WarpKernel::bilinear;
     // Whether samples of pixels that are not trusted are masked, for an estimate to fill in. Otherwise they stay as they
     // are: rows that lost a whole group of slots determine no lamp.
     bool masks_untrusted = false;

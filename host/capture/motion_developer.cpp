@@ -111,7 +111,6 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std:
     aligned.rows.resize(size_t(sequence_.basis.rows));
     aligned.masks_untrusted = options_.estimate != Estimate::none;
     aligned.threads = options_.threads;
-    aligned.kernel = quality_.kernel;
     const Frame& like = *frames.frames.front();
     if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
     std::vector<std::shared_ptr<const ColorPlanes<Sample>>> planes(frames.frames.size());

@@ -54,7 +54,7 @@ class MotionDeveloper {
         size_t basis_frames = 0;     // as planes
         size_t tracking_frames = 0;  // with their flows
     };
-    Kept kept() const { return {short_planes_.size() + float_planes_.size(), flows_.frames()}; }
+    Kept kept() const { return {ready_shorts_.planes.size() + ready_floats_.planes.size(), flows_.frames()}; }
 
     // The middle of the target's tracking exposure, in ticks; where that frame was lost, by its neighbours' word.
     static double instant_of(const TargetFrames& frames, const Sequence& sequence);

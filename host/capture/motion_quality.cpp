@@ -8,11 +8,10 @@ namespace {
 
 std::vector<MotionQuality> presets() {
     const auto method = [](const char* name) { return *flow_method(name); };
-    return {
-        {},
-        {"preview", true, {.local = method("brox-quick"), .refinement = {}, .reduction = 2}, 0.1f},
-        {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}, 0.02f},
-        {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.005f, WarpKernel::cubic}};
+    return {{},
+            {"preview", true, {.local = method("brox-quick"), .refinement = {}, .reduction = 2}, 0.1f},
+            {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}, 0.02f},
+            {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.005f}};
 }
 
 }  // namespace

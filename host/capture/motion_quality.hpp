@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "reflectance/tracking_flows.hpp"
-#include "reflectance/warp.hpp"
 #include "result.hpp"
 
 namespace ols {
@@ -18,7 +17,6 @@ struct MotionQuality {
     TrackingFlowOptions flow = {};
     // Runs of eight pixels whose vectors lie that near to a line are warped along it (warp.hpp).
     float line_tolerance_px = 0.02f;
-    WarpKernel kernel = WarpKernel::bilinear;
     // The motion before and after a target that goes with it into the archive, for motion blur: a shutter of 360 degrees at 24
     // targets a second.
     double motion_reach_s = 1 / 48.0;

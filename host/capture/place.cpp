@@ -125,6 +125,14 @@ void FramePlacer::place(Pending pending) {
     try_lock();
 }
 
+// The triggers that can have fired by a camera time, one after the other from the start of the board on; clocks may differ by a
+// thousandth.
+uint64_t FramePlacer::triggers_until(uint64_t timestamp_ns) const {
+    constexpr double fastest_clock = 1.001;
+    if (!is_first_stretch_ || timestamp_ns <= options_.camera_ns_at_start) return trigger_count_;
+    return uint64_t(fastest_clock * double(timestamp_ns - options_.camera_ns_at_start) / period_ns_) + 2;
+}
+
 void FramePlacer::try_lock() {
     std::vector<OpticalCode::Seen> seen;
     uint64_t end = trigger_count_ - last_position_;  // above the last possible counter of position 0
@@ -132,6 +140,8 @@ void FramePlacer::try_lock() {
         if (pending.frame.whole) seen.push_back({pending.position, &pending.frame.summary});
         if (pending.frame.fired_before < UINT64_MAX)
             end = std::min(end, pending.frame.fired_before - std::min(pending.frame.fired_before, pending.position));
+        const uint64_t limit = triggers_until(pending.frame.stamp.timestamp_ns);
+        end = std::min(end, limit - std::min(limit, pending.position));
     }
     if (end <= next_counter_) return;
     const OpticalCode::Search found = code_.search(seen, next_counter_, end - 1);
@@ -194,6 +204,7 @@ void FramePlacer::end_stretch() {
     for (const Pending& pending : unlocked_) refuse(pending.frame, "its place in the cycle could not be proved");
     unlocked_.clear();
     grid_.reset();
+    is_first_stretch_ = false;
     locked_ = false;
 }
 

@@ -27,6 +27,10 @@ struct IdentifyOptions {
     size_t reorder_frames = 16;  // places by which a frame may be late and lose nothing; a group of a paper cycle
     // Frames that may wait for a proof; above, the oldest are given up. Two cycles of 180 and what the window holds.
     size_t pending_max = 400;
+    // The camera's time before the board was started, or anything below it. No trigger can have fired earlier, so the time of
+    // a frame limits how many can have gone before it, even where the board has long played on. Of the first stretch
+    // only: later ones may have another clock.
+    uint64_t camera_ns_at_start = 0;
 };
 
 // What became of a frame, or of a trigger without one.
@@ -81,6 +85,7 @@ class FramePlacer {
     void end_stretch();
     void end_run();
     void place(Pending pending);
+    uint64_t triggers_until(uint64_t timestamp_ns) const;
     void try_lock();
     void give_up_oldest(size_t count, const std::string& why);
     void examine(Pending pending);
@@ -108,6 +113,7 @@ class FramePlacer {
     CameraStamp last_stamp_;
     uint32_t last_epoch_ = 0;
     uint64_t last_position_ = 0;
+    bool is_first_stretch_ = true;
     bool locked_ = false;
     uint64_t first_counter_ = 0;    // of position 0, when locked
     std::deque<Pending> unlocked_;  // its frames, until then

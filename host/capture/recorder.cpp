@@ -22,8 +22,9 @@ constexpr int read_pause_ms = 20;
 // camera's word; a camera that lives says by its watermark when it has delivered everything.
 constexpr int silent_looks_max = 250;
 
-IdentifyOptions options_for(const Sequence& sequence) {
+IdentifyOptions options_for(const Sequence& sequence, uint64_t camera_ns_at_start = 0) {
     IdentifyOptions options;
+    options.camera_ns_at_start = camera_ns_at_start;
     options.pending_max = sequence.slots.size() + 2 * options.reorder_frames;
     return options;
 }
@@ -120,8 +121,8 @@ class CameraReader {
 // The caller's side: identification and its account.
 class Recording {
   public:
-    Recording(const Sequence& sequence, const RecordSink& sink)
-        : sequence_(sequence), sink_(sink), identifier_(sequence, options_for(sequence)) {
+    Recording(const Sequence& sequence, const RecordSink& sink, uint64_t camera_ns_at_start)
+        : sequence_(sequence), sink_(sink), identifier_(sequence, options_for(sequence, camera_ns_at_start)) {
         report_.slots_total = sequence.trigger_count();
     }
 
@@ -240,12 +241,12 @@ Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& s
                                  const std::atomic<bool>& stop) {
     while (camera.read(0)) {
     }  // frames of an earlier take
-    const uint64_t dropped_before = camera.dropped();
+    const uint64_t dropped_before = camera.dropped(), camera_ns_at_start = camera.watermark_ns();
     if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
 
     const size_t in_flight = frames_in_flight(sequence, sink.cycles_kept);
     EventQueue<Event> queue(in_flight + 64);
-    Recording recording(sequence, sink);
+    Recording recording(sequence, sink, camera_ns_at_start);
     {
         CameraReader reader(camera, stage.cameras[0], black_counts, in_flight, queue);
         BoardLog log(

@@ -8,9 +8,6 @@
 
 namespace ols {
 
-// How samples between pixels come about: bilinear means, or cubic convolution, which is sharper and slower.
-enum class WarpKernel { bilinear, cubic };
-
 // One colour plane of a frame: counts above black, masked_sample<int16_t> where there is none. Pitch in samples.
 struct CountPlane {
     const int16_t* counts = nullptr;
@@ -46,13 +43,5 @@ struct SamplePlane {
 // above zero is not finite, becomes NaN; a whole position is its sample's bits.
 void warp_samples(const SamplePlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                   float* out, size_t out_pitch);
-
-// The same by cubic convolution (Keys 1981, a = -1/2) of sixteen counts, in float, rounded to the nearest: sharper, as it is exact
-// for quadratics where bilinear means are for planes, and several times slower. Where one of the outer counts is masked or lies
-// outside, bilinear or with the edge's count. The same bits on every SIMD path and for any range.
-void warp_counts_cubic(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
-                       int16_t* out, size_t out_pitch);
-void warp_samples_cubic(const SamplePlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
-                        float* out, size_t out_pitch);
 
 }  // namespace ols

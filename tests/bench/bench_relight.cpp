@@ -63,7 +63,7 @@ constexpr int lamp_count = 156;
 
 struct Take {
     int width, height;
-    std::vector<std::vector<float>> planes;
+    std::vector<Plane> planes;
     LampWeights weights;
     std::vector<double> truth;  // of channel 0, in double precision
 };

@@ -104,8 +104,9 @@ struct Outcome {
 };
 
 // Plays a take: the log is asked for every `poll` frames, `lag` triggers behind the camera.
-Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_t lag = 0) {
-    Identifier identifier(sequence);
+Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_t lag = 0,
+             const IdentifyOptions& options = {}, bool board_is_ahead = false) {
+    Identifier identifier(sequence, options);
     Outcome outcome;
     std::set<uint64_t> frames_seen, triggers_seen;
     const auto collect = [&] {
@@ -130,6 +131,7 @@ Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_
         for (; told < take.log.size() && take.log[told].counter < until; ++told) entries.push_back(take.log[told]);
         identifier.add_log(entries, std::max(until, fired), arrivals);
     };
+    if (board_is_ahead) tell_log(take.triggers, 0);
     for (size_t arrival = 0; arrival < take.frames.size(); ++arrival) {
         FrameWitness witness = take.frames[arrival].witness;
         witness.arrival = arrival;
@@ -350,6 +352,26 @@ TEST(Identify, a_camera_that_misses_a_whole_cycle_at_the_start_is_not_believed) 
     Take take = record(stage);
     take.frames.erase(take.frames.begin(), take.frames.begin() + 180);
     EXPECT_EQ(play(take, stage.sequence).missing, range(0, 540));
+}
+
+TEST(Identify, the_time_since_the_start_tells_the_cycle_where_the_board_has_played_on) {
+    SyntheticStage stage("s159", 4);
+    const Take take = record(stage);
+    const auto played = [&](const Take& some, uint64_t camera_ns_at_start) {
+        IdentifyOptions options;
+        options.camera_ns_at_start = camera_ns_at_start;
+        return play(some, stage.sequence, 13, 0, options, true);
+    };
+    EXPECT_FALSE(played(take, 0).missing.empty());  // any cycle could be the first
+    EXPECT_EQ(played(take, clock_offset_ns).missing, std::set<uint64_t>());
+    // Known a cycle too early it is of no use, and does no harm.
+    const uint64_t early_ns = clock_offset_ns - 100'000'000;
+    EXPECT_EQ(played(take, early_ns).mislabelled, 0);
+    EXPECT_FALSE(played(take, early_ns).missing.empty());
+    // Nor when the first cycle is lost.
+    Take late = take;
+    late.frames.erase(late.frames.begin(), late.frames.begin() + 180);
+    EXPECT_EQ(played(late, clock_offset_ns).mislabelled, 0);
 }
 
 TEST(Identify, frames_that_could_be_of_either_of_two_places_are_missing) {

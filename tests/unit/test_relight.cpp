@@ -20,7 +20,7 @@ constexpr double pi = std::numbers::pi;
 struct Scene {
     int width, height;
     Cfa cfa;
-    std::vector<std::vector<float>> planes;
+    std::vector<Plane> planes;
     LampWeights weights;
 
     OlatImages olat() const { return {width, height, cfa, planes}; }

@@ -161,6 +161,24 @@ TEST_P(Warp, a_masked_count_masks_what_it_has_a_part_in) {
     scene.expect_true(tolerance_12_bits);
 }
 
+TEST_P(Warp, a_plane_that_holds_its_edges_shows_them_beyond) {
+    Scene scene(41, 19);
+    scene.set_motion([](int x, int y) { return Vec3{x < 20 ? -30.25 : 30.25, y < 9 ? -25.5 : 25.5, 0}; });
+    std::vector<int16_t> out(scene.counts.size());
+    warp_counts({scene.counts.data(), 41, 19, 41, 4095, true}, GroupMotion(scene.base, scene.step, 0), scene.fraction,
+                out.data(), 41);
+    std::vector<float> floats(scene.counts.begin(), scene.counts.end()), seen(floats.size());
+    warp_samples({floats.data(), 41, 19, 41, true}, GroupMotion(scene.base, scene.step, 0), scene.fraction, {0, 19},
+                 seen.data(), 41);
+    for (int y = 0; y < 19; ++y)
+        for (int x = 0; x < 41; ++x) {
+            const int16_t corner = scene.counts[size_t(y < 9 ? 0 : 18) * 41 + (x < 20 ? 0 : 40)];
+            const size_t p = size_t(y) * 41 + size_t(x);
+            ASSERT_EQ(out[p], corner) << x << " " << y;
+            ASSERT_EQ(seen[p], float(corner)) << x << " " << y;
+        }
+}
+
 TEST_P(Warp, flow_that_is_no_number_masks) {
     Scene scene(32, 4);
     scene.base.u[3] = NAN;
