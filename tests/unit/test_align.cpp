@@ -62,13 +62,14 @@ std::vector<std::vector<Sum>> aligned(const std::shared_ptr<Frame>& frame, const
     const Image black = black_of(frame->cfa);
     AlignedRows<Sample, Sum> rows;
     rows.alignment = std::make_shared<Alignment>(path, width, height, frame->cfa, 0.02f, 1);
-    rows.rows = {
-        {{std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*frame, black)), rows.alignment->place_of(tick)}}};
+    const auto dark = black_planes<Sample>(black, frame->cfa, frame->format);
+    rows.rows = {{{std::make_shared<ColorPlanes<Sample>>(color_planes(*frame, dark)), rows.alignment->place_of(tick)}}};
     rows.threads = 1;
     std::vector<std::vector<Sum>> out;
     for (int channel = 0; channel < samples_per_pixel(frame->cfa); ++channel) {
         const Band band{0, height, width, channel, samples_per_pixel(frame->cfa)};
-        out.push_back(rows.load(band, *frame, black, false).rows[0]);
+        const auto loaded = rows.load(band, *frame, black, false).rows[0];
+        out.emplace_back(loaded.begin(), loaded.end());
     }
     return out;
 }
