@@ -77,7 +77,7 @@ TEST(Relight, a_mosaic_relit_and_demosaiced_is_the_colour_image_of_a_smooth_subj
     const int size = 24;
     Scene colour{size, size, Cfa::rgb, {}, {}}, mosaic{size, size, Cfa::grbg, {}, {}};
     for (int lamp = 0; lamp < 4; ++lamp) {
-        std::vector<float> planes[3], raw;
+        Plane planes[3], raw;
         for (int i = 0; i < size * size; ++i) {
             const int x = i % size, y = i / size;
             for (int c = 0; c < 3; ++c) planes[c].push_back(0.2f + 0.01f * float(lamp * x + y));
@@ -120,7 +120,7 @@ TEST(Relight, a_white_sphere_in_a_white_furnace_meets_the_closed_form_at_every_n
         const double x = (i % size + 0.5) / size * 2 - 1, y = 1 - (i / size + 0.5) / size * 2, r2 = x * x + y * y;
         normals.push_back(r2 < 1 ? Vec3{x, y, std::sqrt(1 - r2)} : Vec3{});
     }
-    std::vector<std::vector<float>> planes(cells.size());
+    std::vector<Plane> planes(cells.size());
     for (int lamp = 0; lamp < cells.size(); ++lamp)
         for (Vec3 n : normals) planes[lamp].push_back(float(std::max(0.0, dot(n, cells.directions()[lamp]))));
     Image furnace(64, 32, 3);
