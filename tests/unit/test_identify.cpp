@@ -131,7 +131,7 @@ Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_
         for (; told < take.log.size() && take.log[told].counter < until; ++told) entries.push_back(take.log[told]);
         identifier.add_log(entries, std::max(until, fired), arrivals);
     };
-    if (board_is_ahead) tell_log(take.triggers, 0);
+    if (board_is_ahead) fired = take.triggers;
     for (size_t arrival = 0; arrival < take.frames.size(); ++arrival) {
         FrameWitness witness = take.frames[arrival].witness;
         witness.arrival = arrival;
