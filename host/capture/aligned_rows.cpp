@@ -139,7 +139,7 @@ std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
     return least;
 }
 
-// A frame that saturates nowhere can lack a sample only where its motion is not known.
+// A frame that saturates nowhere lacks no sample: what motion leads to outside it takes its edge.
 template <typename Sample, typename Sum>
 void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, std::span<Sum> out,
                                         std::vector<uint8_t>& marks) const {

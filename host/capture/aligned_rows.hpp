@@ -30,7 +30,8 @@ struct AlignedRows {
 
     // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` saturated samples count like others,
     // marked all the same.
-    // Marks mask_saturated, and mask_missing where motion led outside the frame or the row was lost.
+    // Marks mask_saturated, mask_missing where the row was lost, and mask_misaligned with `masks_untrusted`. What motion leads to
+    // outside the frame takes the frame's edge, and is not marked: confidence() says that it is not trusted.
     RowBand<Sum> load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const;
 
     // Of each pixel, the least of all intervals that frames are taken from.

@@ -31,6 +31,15 @@ class SampleRow {
     bool is_float_;
 };
 
+// Less black, and no more than a Sample holds: without a white (`ColorPlanes::clipped`) a sensor may count up to 65535.
+template <typename Sample>
+Sample above_black(int counts, Sample black) {
+    if constexpr (std::is_same_v<Sample, int16_t>)
+        return Sample(std::min(counts - black, int(std::numeric_limits<int16_t>::max())));
+    else
+        return Sample(counts) - black;
+}
+
 // Every step-th of `samples`, less black, masked where it is not below white; step is known when compiled, or the loop would
 // not be vectorised.
 template <size_t step, typename Count, typename Sample>
@@ -39,7 +48,7 @@ void subtract_row(const Count* samples, float white, const Sample* black, int wi
         const auto limit = int(std::ceil(std::min(white, 65536.0f)));
         for (int x = 0; x < width; ++x) {
             const int counts = samples[size_t(x) * step];
-            out[x] = counts < limit ? Sample(Sample(counts) - black[x]) : masked_sample<Sample>;
+            out[x] = counts < limit ? above_black(counts, black[x]) : masked_sample<Sample>;
         }
     } else {
         for (int x = 0; x < width; ++x) {

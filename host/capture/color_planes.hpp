@@ -10,8 +10,8 @@
 
 namespace ols {
 
-// One sample in every step_x-th column and step_y-th row of the frame, from (first_x, first_y) on: what one colour of a
-// mosaic sees. `channel` of the samples of a pixel.
+// One sample in every step-th column and row of the frame, from (first_x, first_y) on: what one colour of a mosaic sees.
+// `channel` of the samples of a pixel.
 struct ColorPlace {
     int first_x = 0, first_y = 0, step = 1, channel = 0;
 

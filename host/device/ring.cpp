@@ -15,6 +15,8 @@
 #include <cstring>
 #include <ctime>
 
+#include "image/whole_file.hpp"
+
 namespace ols {
 
 namespace {
@@ -60,25 +62,24 @@ Result<RingWriter> RingWriter::create(const std::string& path, uint32_t slots, u
     auto mapping = std::make_unique<Mapping>();
     mapping->bytes = sizeof(RingHeader) + slots * stride;
 
-    // A fresh file under a temporary name, renamed when it is ready: a reader never sees a half-made header.
-    const std::string temporary = path + ".part";
-    const int fd = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (fd < 0) return fail("cannot make ring '" + path + "': " + std::strerror(errno));
-    void* memory = MAP_FAILED;
-    if (posix_fallocate(fd, 0, off_t(mapping->bytes)) == 0)
-        memory = mmap(nullptr, mapping->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    ::close(fd);
-    if (memory == MAP_FAILED) {
-        unlink(temporary.c_str());
-        return fail("cannot reserve " + std::to_string(mapping->bytes >> 20) + " MiB for ring '" + path +
-                    "': free space there or choose fewer slots");
-    }
-    mapping->header = new (memory) RingHeader{};
-    mapping->header->magic = ring_magic;
-    mapping->header->slots = slots;
-    mapping->header->stride = uint32_t(stride);
-    if (rename(temporary.c_str(), path.c_str()) != 0)
-        return fail("cannot make ring '" + path + "': " + std::strerror(errno));
+    // A reader never sees a half-made header.
+    const Status made = write_whole_file(path, [&](const std::string& temporary) -> Status {
+        const int fd = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+        if (fd < 0) return fail("cannot make ring '" + path + "': " + std::strerror(errno));
+        void* memory = MAP_FAILED;
+        if (posix_fallocate(fd, 0, off_t(mapping->bytes)) == 0)
+            memory = mmap(nullptr, mapping->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+        ::close(fd);
+        if (memory == MAP_FAILED)
+            return fail("cannot reserve " + std::to_string(mapping->bytes >> 20) + " MiB for ring '" + path +
+                        "': free space there or choose fewer slots");
+        mapping->header = new (memory) RingHeader{};
+        mapping->header->magic = ring_magic;
+        mapping->header->slots = slots;
+        mapping->header->stride = uint32_t(stride);
+        return Done{};
+    });
+    if (!made) return made.error();
     return RingWriter(std::move(mapping));
 }
 

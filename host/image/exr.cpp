@@ -10,11 +10,11 @@
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <half.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
+
+#include "image/whole_file.hpp"
 
 namespace ols {
 
@@ -78,44 +78,41 @@ Status write_exr(const std::string& path, const Image& image, ExrType type,
     static const std::vector<std::vector<std::string>> names = {{}, {"Y"}, {}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
     assert(image.channels == 1 || image.channels == 3 || image.channels == 4);
     const auto& channels = names[image.channels];
-    const std::string temporary = path + ".part" + std::to_string(getpid());
-    try {
-        Imf::Header header(image.width, image.height);
-        for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
-        // The defaults of the type are the primaries and white point of Rec. 709.
-        const auto color = attributes.find("colorInteropID");
-        if (color != attributes.end() && color->second == "lin_rec709_scene")
-            Imf::addChromaticities(header, Imf::Chromaticities());
-        const bool half = type == ExrType::half_float;
-        for (const auto& name : channels) header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
+    return write_whole_file(path, [&](const std::string& temporary) -> Status {
+        try {
+            Imf::Header header(image.width, image.height);
+            for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
+            // The defaults of the type are the primaries and white point of Rec. 709.
+            const auto color = attributes.find("colorInteropID");
+            if (color != attributes.end() && color->second == "lin_rec709_scene")
+                Imf::addChromaticities(header, Imf::Chromaticities());
+            const bool half = type == ExrType::half_float;
+            for (const auto& name : channels)
+                header.channels().insert(name, Imf::Channel(half ? Imf::HALF : Imf::FLOAT));
 
-        // OutputFile converts nothing: half files need half samples (values beyond 65504 become the largest half, not
-        // Inf).
-        std::vector<::half> halves;
-        Imf::FrameBuffer buffer;
-        if (half) {
-            halves.reserve(image.data.size());
-            for (float v : image.data) halves.push_back(clamped_half(v));
+            // OutputFile converts nothing: half files need half samples (values beyond 65504 become the largest half, not
+            // Inf).
+            std::vector<::half> halves;
+            Imf::FrameBuffer buffer;
+            if (half) {
+                halves.reserve(image.data.size());
+                for (float v : image.data) halves.push_back(clamped_half(v));
+            }
+            for (int c = 0; c < image.channels; ++c) {
+                const size_t size = half ? sizeof(::half) : sizeof(float);
+                const char* base = half ? reinterpret_cast<const char*>(halves.data() + c)
+                                        : reinterpret_cast<const char*>(image.data.data() + c);
+                buffer.insert(channels[c], Imf::Slice(half ? Imf::HALF : Imf::FLOAT, const_cast<char*>(base),
+                                                      size * image.channels, size * image.channels * image.width));
+            }
+            Imf::OutputFile file(temporary.c_str(), header);
+            file.setFrameBuffer(buffer);
+            file.writePixels(image.height);
+            return Done{};
+        } catch (const std::exception& e) {
+            return fail("cannot write '" + path + "': " + e.what());
         }
-        for (int c = 0; c < image.channels; ++c) {
-            const size_t size = half ? sizeof(::half) : sizeof(float);
-            const char* base = half ? reinterpret_cast<const char*>(halves.data() + c)
-                                    : reinterpret_cast<const char*>(image.data.data() + c);
-            buffer.insert(channels[c], Imf::Slice(half ? Imf::HALF : Imf::FLOAT, const_cast<char*>(base),
-                                                  size * image.channels, size * image.channels * image.width));
-        }
-        Imf::OutputFile file(temporary.c_str(), header);
-        file.setFrameBuffer(buffer);
-        file.writePixels(image.height);
-    } catch (const std::exception& e) {
-        std::error_code ignored;
-        std::filesystem::remove(temporary, ignored);
-        return fail("cannot write '" + path + "': " + e.what());
-    }
-    std::error_code error;
-    std::filesystem::rename(temporary, path, error);
-    if (error) return fail("cannot write '" + path + "': " + error.message());
-    return Done{};
+    });
 }
 
 }  // namespace ols

@@ -2,15 +2,12 @@
 // PNG writing through OpenCV's encoder.
 #include "image/png.hpp"
 
-#include <unistd.h>
-
 #include <cassert>
-#include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "image/tone.hpp"
+#include "image/whole_file.hpp"
 
 namespace ols {
 
@@ -26,18 +23,7 @@ Status write_png(const std::string& path, int width, int height, std::span<const
     } catch (const cv::Exception& e) {
         return fail("cannot write '" + path + "': " + e.what());
     }
-    const std::string temporary = path + ".part" + std::to_string(getpid());
-    std::ofstream file(temporary, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(encoded.data()), std::streamsize(encoded.size()));
-    file.close();
-    std::error_code error;
-    if (file) std::filesystem::rename(temporary, path, error);
-    if (!file || error) {
-        std::error_code ignored;
-        std::filesystem::remove(temporary, ignored);
-        return fail("cannot write '" + path + "': check that the folder exists and has space");
-    }
-    return Done{};
+    return write_whole_file(path, std::string_view(reinterpret_cast<const char*>(encoded.data()), encoded.size()));
 }
 
 Status write_png_preview(const std::string& path, const Image& scene_linear) {

@@ -19,7 +19,6 @@
 
 #include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
-#include "reflectance/variance.hpp"
 
 namespace ols {
 
@@ -299,16 +298,6 @@ void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t 
 void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out) {
     for (const uint32_t* row : rows)
         for (size_t p = 0; p < samples; ++p) out[p] |= row[p];
-}
-
-void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
-                       const NoiseModel& noise, std::span<const float> gain, float* out) {
-    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
-}
-
-void estimate_variance(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
-                       const NoiseModel& noise, std::span<const float> gain, float* out) {
-    VarianceEstimate(basis, noise).estimate(rows, samples, gain, out);
 }
 
 }  // namespace ols

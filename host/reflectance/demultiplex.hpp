@@ -10,7 +10,6 @@
 
 #include "reflectance/masked_sample.hpp"
 #include "stage/basis.hpp"
-#include "stage/stage.hpp"
 
 namespace ols {
 
@@ -42,11 +41,5 @@ void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t 
 // out[p] |= rows[row][p] over all rows: every lamp value of a sample rests on all rows of a multiplexed basis, and a
 // target's mask is one value for all lamps.
 void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out);
-
-// VarianceEstimate (variance.hpp) for one call. Who estimates band after band makes it once.
-void estimate_variance(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
-                       const NoiseModel& noise, std::span<const float> gain, float* out);
-void estimate_variance(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
-                       const NoiseModel& noise, std::span<const float> gain, float* out);
 
 }  // namespace ols

@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <new>
 #include <vector>
+
+#include "image/plane.hpp"
 
 // Before a loop whose iterations do not touch each other's elements: the compiler may vectorise it without proof.
 #if defined(__clang__)
@@ -16,20 +17,6 @@
 #endif
 
 namespace ols {
-
-// Memory that begins at a cache line, which is as long as the longest vector.
-template <typename T>
-struct CacheAligned {
-    using value_type = T;
-    static constexpr std::align_val_t line{64};
-
-    CacheAligned() = default;
-    template <typename U>
-    CacheAligned(const CacheAligned<U>&) {}
-    T* allocate(size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), line)); }
-    void deallocate(T* p, size_t) { ::operator delete(p, line); }
-    bool operator==(const CacheAligned&) const { return true; }
-};
 
 constexpr int cache_line_floats = 16;
 
@@ -70,14 +57,14 @@ struct PaddedPlane {
 // colour's rows, where p = first_x(color, y), the x of the row's first pixel of that colour.
 struct CheckeredPlane {
     int half = 0, stride = 0, rows = 0;
-    std::vector<float, CacheAligned<float>> data;
+    Plane data;
 
     CheckeredPlane() = default;
     CheckeredPlane(int width, int row_count)
         : half((width + 1) / 2),
           stride(aligned_stride(half)),
           rows(row_count),
-          data(size_t(stride) * size_t(rows) * 2) {}
+          data(size_t(stride) * size_t(rows) * 2, 0.0f) {}
     float* row(int color, int y) {
         return data.data() + ptrdiff_t(stride) * (2 * ptrdiff_t(y) + color) + cache_line_floats;
     }

@@ -40,7 +40,7 @@ class RelaxationRows {
         : half_((width + 1) / 2),
           mask_(int(std::bit_ceil(unsigned(2 * sweeps + 2))) - 1),
           stride_(aligned_stride(half_)),
-          data_(size_t(mask_ + 1) * planes * 2 * size_t(stride_)) {}
+          data_(size_t(mask_ + 1) * planes * 2 * size_t(stride_), 0.0f) {}
 
     int half() const { return half_; }
     float* row(Plane plane, int color, int y) {
@@ -49,7 +49,7 @@ class RelaxationRows {
 
   private:
     int half_, mask_, stride_;
-    std::vector<float, CacheAligned<float>> data_;
+    ols::Plane data_;
 };
 
 // (A + E)^-1. A is positive semidefinite and E at least `floor`, so the determinant is at least floor^2: nothing is singular,

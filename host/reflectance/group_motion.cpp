@@ -245,17 +245,5 @@ void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) c
     }
 }
 
-FlowField of_color_plane(const FlowField& flow, int first_x, int first_y) {
-    FlowField out((flow.width - first_x + 1) / 2, (flow.height - first_y + 1) / 2);
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x) {
-            const size_t from = size_t(2 * y + first_y) * size_t(flow.width) + size_t(2 * x + first_x);
-            const size_t to = size_t(y) * size_t(out.width) + size_t(x);
-            out.u[to] = flow.u[from] / 2;
-            out.v[to] = flow.v[from] / 2;
-        }
-    return out;
-}
-
 }  // namespace ols
 #endif

@@ -75,8 +75,4 @@ class GroupMotion {
     std::vector<int32_t> own_index_;  // of each run; -1 for a line
 };
 
-// A flow for every second pixel of every second row, beginning at (first_x, first_y), in units of that plane's pixels: what
-// one colour of a mosaic needs.
-FlowField of_color_plane(const FlowField& flow, int first_x, int first_y);
-
 }  // namespace ols

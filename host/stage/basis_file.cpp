@@ -11,6 +11,7 @@
 #include <optional>
 #include <sstream>
 
+#include "image/whole_file.hpp"
 #include "stage/basis_inverse.hpp"
 #include "wire.h"
 
@@ -134,18 +135,7 @@ Status write_basis(const std::string& path, const Basis& basis, const std::strin
     for (int r = 0; r < basis.rows; ++r)
         for (int lamp = 0; lamp < basis.lamps; ++lamp)
             text += fmt::format("{}{}", basis.level(r, lamp), lamp + 1 < basis.lamps ? "," : "\n");
-    const std::string temporary = path + ".part";
-    std::ofstream file(temporary, std::ios::binary);
-    file << text;
-    file.close();
-    std::error_code error;
-    if (file) std::filesystem::rename(temporary, path, error);
-    if (!file || error) {
-        std::error_code ignored;
-        std::filesystem::remove(temporary, ignored);
-        return fail("cannot write '" + path + "': check that the folder exists and has space");
-    }
-    return Done{};
+    return write_whole_file(path, text);
 }
 
 }  // namespace ols

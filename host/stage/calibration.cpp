@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "image/exr.hpp"
+#include "image/whole_file.hpp"
 #include "stage/toml_section.hpp"
 
 namespace ols {
@@ -78,14 +78,10 @@ Status write_calibration(const std::string& folder, const Calibration& calibrati
         if (Status s = write_exr(camera + "/black.exr", planes.black, ExrType::single_float); !s.ok()) return s;
         if (Status s = write_exr(camera + "/flat.exr", planes.flat, ExrType::single_float); !s.ok()) return s;
     }
-    const std::string path = folder + "/calibration.toml", temporary = path + ".part";
-    std::ofstream file(temporary, std::ios::binary);
-    file << fmt::format("cameras = {}\ncard_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
-                        calibration.cameras.size(), record.card_reflectance, record.card_exposure_us, record.frames);
-    file.close();
-    if (file) std::filesystem::rename(temporary, path, error);
-    if (!file || error) return fail("cannot write '" + path + "': check that the folder has space");
-    return Done{};
+    return write_whole_file(
+        folder + "/calibration.toml",
+        fmt::format("cameras = {}\ncard_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
+                    calibration.cameras.size(), record.card_reflectance, record.card_exposure_us, record.frames));
 }
 
 Calibration nominal_calibration(const StageConfig& stage) {

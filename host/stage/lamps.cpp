@@ -7,10 +7,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <optional>
+
+#include "image/whole_file.hpp"
 
 namespace ols {
 
@@ -178,18 +179,7 @@ Status write_lp(const std::string& path, std::vector<LightPosition> lights) {
         const Vec3 d = normalized(light.direction);
         text += fmt::format("{} {:.9f} {:.9f} {:.9f}\n", light.name, d.x, d.y, d.z);
     }
-    const std::string temporary = path + ".part";
-    std::ofstream file(temporary, std::ios::binary);
-    file << text;
-    file.close();
-    std::error_code error;
-    if (file) std::filesystem::rename(temporary, path, error);
-    if (!file || error) {
-        std::error_code ignored;
-        std::filesystem::remove(temporary, ignored);
-        return fail("cannot write '" + path + "': check that the folder exists and has space");
-    }
-    return Done{};
+    return write_whole_file(path, text);
 }
 
 }  // namespace ols

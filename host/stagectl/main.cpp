@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
 // stagectl: the light stage's control program.
-#include <malloc.h>
-
+#include "image/freed_planes.hpp"
 #include "stagectl/verbs.hpp"
 
 int main(int argc, char** argv) {
-    // A target's planes are let go of and made anew, target after target: memory that went back to the kernel in between would
-    // be cleared each time, which takes as long as the inversion.
-    mallopt(M_MMAP_THRESHOLD, 32 << 20);
-    mallopt(M_TRIM_THRESHOLD, 1 << 30);
+    ols::keep_freed_planes();  // a take makes the same planes for target after target
     CLI::App app{"Controls a light stage: sequences, takes, calibration, and photographs from elsewhere."};
     app.name("stagectl");
     app.footer("Exit codes: 0 done; 1 an error, named; 2 a take that is not complete; else wrong arguments.");

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Optical flow: methods side by side on clean scenes and through the camera's noise, and what Brox's settings cost.
 // links: ols_reflectance
-#include <malloc.h>
-
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "../unit/flow_scenes.hpp"
 #include "bench.hpp"
+#include "image/freed_planes.hpp"
 #include "reflectance/flow.hpp"
 
 using namespace ols;
@@ -101,9 +100,13 @@ std::vector<Setting> pyramid_ratios(const std::vector<FlowScene>& scenes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    // Freed planes stay with the process, as in one that estimates flow after flow: else half of the time goes to fresh pages.
-    mallopt(M_MMAP_THRESHOLD, 1 << 28);
-    mallopt(M_TRIM_THRESHOLD, 1 << 29);
+    if (!keep_freed_planes()) {
+        std::fputs(
+            "bench_flow: the allocator returns freed planes to the kernel: times would be those of its clearing "
+            "pages\n",
+            stderr);
+        return 1;
+    }
     cv::setNumThreads(1);
     Bench bench(
         argc, argv,

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Warping a cycle's slots to one target: beside OpenCV, by how straight motion must be, and from flow of lower resolution.
 // links: ols_reflectance
-#include <malloc.h>
-
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "bench.hpp"
+#include "image/freed_planes.hpp"
 #include "reflectance/masked_sample.hpp"
 #include "reflectance/warp.hpp"
 
@@ -177,9 +176,13 @@ void measure_resolutions(Bench& bench, const Size& size, const std::vector<std::
 }  // namespace
 
 int main(int argc, char** argv) {
-    // Freed planes stay with the process, as in one that warps target after target.
-    mallopt(M_MMAP_THRESHOLD, 1 << 28);
-    mallopt(M_TRIM_THRESHOLD, 1 << 29);
+    if (!keep_freed_planes()) {
+        std::fputs(
+            "bench_warp: the allocator returns freed planes to the kernel: times would be those of its clearing "
+            "pages\n",
+            stderr);
+        return 1;
+    }
     cv::setNumThreads(1);
     Bench bench(
         argc, argv,

@@ -10,6 +10,7 @@
 
 #include "reflectance/demultiplex.hpp"
 #include "reflectance/planes.hpp"
+#include "reflectance/variance.hpp"
 
 using namespace ols;
 
@@ -171,7 +172,7 @@ TEST_P(Demultiplex, estimated_variance_is_the_variance_of_many_noisy_inversions)
     for (const auto& lamp : lamps)
         for (const float v : lamp) variance += (v - 50.0) * (v - 50.0) / double(samples * lamps.size());
     std::vector<float> estimate(samples);
-    estimate_variance(basis, pointers(rows), samples, model, gain, estimate.data());
+    VarianceEstimate(basis, model).estimate(pointers(rows), samples, gain, estimate.data());
     const double mean_estimate = std::accumulate(estimate.begin(), estimate.end(), 0.0) / double(samples);
     EXPECT_NEAR(variance / mean_estimate, 1, 0.03);
 }

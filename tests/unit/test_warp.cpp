@@ -364,17 +364,6 @@ TEST(GroupMotionOfLowResolution, smears_an_edge_over_a_pixel_of_the_field) {
     EXPECT_EQ(x[17] - 17, 8);
 }
 
-// Colours of a mosaic do not mix: planes of red only show red wherever they are moved from.
-TEST(ColorPlanes, take_every_second_vector_in_their_own_pixels) {
-    FlowField flow(5, 4);
-    for (size_t p = 0; p < flow.size(); ++p) flow.u[p] = float(p), flow.v[p] = -float(p);
-    const FlowField plane = of_color_plane(flow, 1, 0);
-    EXPECT_EQ(plane.width, 2);
-    EXPECT_EQ(plane.height, 2);
-    EXPECT_EQ(plane.u, (std::vector<float>{0.5f, 1.5f, 5.5f, 6.5f}));
-    EXPECT_EQ(plane.v[3], -6.5f);
-}
-
 // By definition, for each pixel; fields with but one row or column included.
 TEST(Concatenation, is_the_sum_of_a_vector_and_the_bilinear_one_where_it_leads) {
     for (const auto& [width, height] : {std::pair{37, 11}, {4, 1}, {1, 5}, {2, 2}, {1, 1}}) {

@@ -6,10 +6,10 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <thread>
 
 #include "board_process.hpp"
+#include "image/whole_file.hpp"
 #include "inputs.hpp"
 #include "plan.hpp"
 #include "verbs.hpp"
@@ -206,13 +206,7 @@ class StageRun {
             if (i == 0) report = entry;
             report["cameras"].push_back(std::move(entry));
         }
-        const std::string path = options_.work + "/cost.json";
-        std::ofstream file(path + ".part");
-        file << report.dump(2) << '\n';
-        file.close();
-        std::error_code error;
-        std::filesystem::rename(path + ".part", path, error);
-        if (!file || error) return fail("cannot write '" + path + "': check the space there");
+        if (const Status s = write_whole_file(options_.work + "/cost.json", report.dump(2) + '\n'); !s) return s;
         if (options_.json) fmt::print("{}\n", report.dump(2));
         return Done{};
     }

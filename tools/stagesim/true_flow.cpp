@@ -11,12 +11,11 @@
 #include <ImfPartType.h>
 #include <half.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <limits>
 
 #include "geometry.hpp"
+#include "image/whole_file.hpp"
 #include "pinhole.hpp"
 
 namespace ols {
@@ -69,43 +68,39 @@ TrueFlow true_flow(const Scene& scene, const CameraConfig& config, double from_u
 
 Status write_true_flow(const std::string& path, const TrueFlow& flow, double from_us, double to_us) {
     const int width = flow.flow.width, height = flow.flow.height;
-    const std::string temporary = path + ".part" + std::to_string(getpid());
-    try {
-        std::vector<Imf::Header> headers(2, Imf::Header(width, height));
-        headers[0].setName("flow");
-        headers[1].setName("mask");
-        for (Imf::Header& header : headers) {
-            header.setType(Imf::SCANLINEIMAGE);
-            header.insert("fromUs", Imf::DoubleAttribute(from_us));
-            header.insert("toUs", Imf::DoubleAttribute(to_us));
-        }
-        for (const char* name : {"forward.u", "forward.v"})
-            headers[0].channels().insert(name, Imf::Channel(Imf::FLOAT));
-        headers[1].channels().insert("visible", Imf::Channel(Imf::HALF));
-        Imf::MultiPartOutputFile file(temporary.c_str(), headers.data(), int(headers.size()));
+    return write_whole_file(path, [&](const std::string& temporary) -> Status {
+        try {
+            std::vector<Imf::Header> headers(2, Imf::Header(width, height));
+            headers[0].setName("flow");
+            headers[1].setName("mask");
+            for (Imf::Header& header : headers) {
+                header.setType(Imf::SCANLINEIMAGE);
+                header.insert("fromUs", Imf::DoubleAttribute(from_us));
+                header.insert("toUs", Imf::DoubleAttribute(to_us));
+            }
+            for (const char* name : {"forward.u", "forward.v"})
+                headers[0].channels().insert(name, Imf::Channel(Imf::FLOAT));
+            headers[1].channels().insert("visible", Imf::Channel(Imf::HALF));
+            Imf::MultiPartOutputFile file(temporary.c_str(), headers.data(), int(headers.size()));
 
-        const auto slice = [&](Imf::PixelType type, const void* data, size_t bytes) {
-            return Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * size_t(width));
-        };
-        Imf::FrameBuffer vectors, mask;
-        vectors.insert("forward.u", slice(Imf::FLOAT, flow.flow.u.data(), sizeof(float)));
-        vectors.insert("forward.v", slice(Imf::FLOAT, flow.flow.v.data(), sizeof(float)));
-        const std::vector<::half> visible(flow.visible.begin(), flow.visible.end());
-        mask.insert("visible", slice(Imf::HALF, visible.data(), sizeof(::half)));
-        Imf::OutputPart flow_part(file, 0), mask_part(file, 1);
-        flow_part.setFrameBuffer(vectors);
-        flow_part.writePixels(height);
-        mask_part.setFrameBuffer(mask);
-        mask_part.writePixels(height);
-    } catch (const std::exception& e) {
-        std::error_code ignored;
-        std::filesystem::remove(temporary, ignored);
-        return fail("cannot write '" + path + "': " + e.what());
-    }
-    std::error_code error;
-    std::filesystem::rename(temporary, path, error);
-    if (error) return fail("cannot write '" + path + "': " + error.message());
-    return Done{};
+            const auto slice = [&](Imf::PixelType type, const void* data, size_t bytes) {
+                return Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * size_t(width));
+            };
+            Imf::FrameBuffer vectors, mask;
+            vectors.insert("forward.u", slice(Imf::FLOAT, flow.flow.u.data(), sizeof(float)));
+            vectors.insert("forward.v", slice(Imf::FLOAT, flow.flow.v.data(), sizeof(float)));
+            const std::vector<::half> visible(flow.visible.begin(), flow.visible.end());
+            mask.insert("visible", slice(Imf::HALF, visible.data(), sizeof(::half)));
+            Imf::OutputPart flow_part(file, 0), mask_part(file, 1);
+            flow_part.setFrameBuffer(vectors);
+            flow_part.writePixels(height);
+            mask_part.setFrameBuffer(mask);
+            mask_part.writePixels(height);
+            return Done{};
+        } catch (const std::exception& e) {
+            return fail("cannot write '" + path + "': " + e.what());
+        }
+    });
 }
 
 }  // namespace ols
