@@ -59,3 +59,19 @@ TEST(Motion, a_moved_object_looks_as_if_it_had_been_placed_there) {
     EXPECT_NE(before.data, after.data);
     EXPECT_EQ(a.cost().placings, 2u);
 }
+
+// Nothing that is made for the first look depends on where the scene stood then.
+TEST(Motion, a_scene_looked_at_beforehand_gives_the_same_pictures) {
+    Scene scene;
+    Material skin = matte(0.5f);
+    skin.type = MaterialType::skin;
+    add_quad(scene, {0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 0.1, skin);
+    scene.objects[0].motion = {{0, {}, {1, 0, 0, 0}}, {1000, {0.05, 0.02, 0}, rotation_about({0, 1, 0}, 20)}};
+    scene.texture_step_m = 1e-3f;
+    const StageConfig stage = small_stage({{0.3, 0.5, 0.8}});
+    Renderer cold({scene, stage, stage.cameras[0], false}, {}), warm({scene, stage, stage.cameras[0], false}, {});
+    warm.place(0);
+    for (const double time_us : {700.0, 0.0, 1000.0})
+        EXPECT_EQ(warm.light(one_lamp(1, 0), time_us).data, cold.light(one_lamp(1, 0), time_us).data) << time_us;
+    EXPECT_EQ(warm.cost().placings, cold.cost().placings + 1);
+}

@@ -36,13 +36,16 @@ class Renderer {
     // Shades every lamp of a still scene now, so that exposures cost only sums; `progress` gets 0 to 1.
     void render_all_lamps(const std::function<void(double)>& progress);
 
+    // Poses the scene as it is at a time and finds what is seen of it, as every picture does by itself. Done beforehand, the first
+    // picture of a moving scene need not make its looks as well, which takes as long as several pictures.
+    void place(double time_us);
+
     int channels() const { return effects_.mosaic() ? 1 : 3; }
     size_t lamp_count() const { return lamps_.size(); }
     const EffectSet& effects() const { return effects_; }
     const Cost& cost() const { return cost_; }
 
   private:
-    void place(double time_us);
     void render(const std::vector<uint32_t>& lamps);
 
     Setup setup_;

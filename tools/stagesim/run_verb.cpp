@@ -113,8 +113,11 @@ class StageRun {
                                                            fmt::format("{}/cam{}.frames.jsonl", options_.work, index),
                                                            faults, options_.pace == "virtual", cancelled_));
         Renderer& renderer = cameras_.back()->renderer();
-        // The board starts when the lamps are done: its socket says that the stage is ready.
-        if (!renderer.effects().movement())
+        // The board starts when the lamps are done: its socket says that the stage is ready. A moving scene is looked at once, so
+        // that its first frame comes soon after its trigger, not when the daemon takes the camera for dead.
+        if (renderer.effects().movement())
+            renderer.place(0);
+        else
             renderer.render_all_lamps([](double done) { show_progress("lamps", done); });
         return Done{};
     }
