@@ -248,6 +248,7 @@ nlohmann::json describe_sequence(const Sequence& sequence) {
             {"slots", sequence.slots.size()},
             {"kinds", kinds},  // one letter a slot: basis, tracking, matte, dark
             {"frame_rate_hz", sequence.config.frame_rate_hz},
+            {"tick_hz", tick_hz},
             {"period_ticks", sequence.slots.front().period_ticks},
             {"exposure_us",
              {{"basis", sequence.config.basis_exposure_us},

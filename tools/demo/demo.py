@@ -26,7 +26,6 @@ CARD_REFLECTANCE = 0.985
 # Of .cache/assets/env: exposure in stops, turn about the vertical in degrees.
 ENVIRONMENTS = {"courtyard": (0.2, 0), "city": (0.4, 0), "sunset": (1.3, 120)}
 TRUTH_ENVIRONMENT = "sunset"
-MOVING_ENVIRONMENT = "sunset"
 COMPARED = ["single", "hadamard156"]  # bases whose pictures are held against the truth
 OTHERS = ["triangle", "triangle300", "planes156", "s155", "paley163", "spherical_harmonics:10"]  # recorded by name, without a sequence file
 SHOWN = "s159"  # the basis of the take that is shown
@@ -104,11 +103,11 @@ class Demo:
 
     def move(self):
         """A moving head, with motion compensation and without."""
-        light = ["--env", environment(MOVING_ENVIRONMENT), "--rotate", ENVIRONMENTS[MOVING_ENVIRONMENT][1]]
         takes = moving.record(self.clock, self.out)
-        films = moving.film(self.clock, self.out, light)
+        films = moving.film(self.clock, self.out, environment(moving.ENVIRONMENT))
         moving.animate(films, self.out / "moving.gif")
-        figures = moving.compare(self.clock, self.out, light)
+        moving.sequence(films, self.out / "moving.jpg")
+        figures = moving.compare(self.out)
         for quality, take in takes.items():
             figures[f"moving_slots_missing_{quality}"] = take["slots_missing"]
         return figures
@@ -205,7 +204,8 @@ def main():
     (out / "report.json").write_text(json.dumps(report, indent=1) + "\n")
     (out / "report.txt").write_text(text_report(report))
     print(text_report(report))
-    print(f"Look at {options.out}/contact-sheet.png, {options.out}/relit_*.png and {options.out}/moving.gif")
+    print(f"Look at {options.out}/contact-sheet.png, {options.out}/relit_*.png, {options.out}/moving.gif and moving.jpg, "
+          "and for motion blur at moving/blurred_*.png")
 
 
 if __name__ == "__main__":

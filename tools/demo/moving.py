@@ -2,6 +2,8 @@
 """The moving head: recorded with and without motion compensation, relit as short films, and held against the virtual stage
 frozen at each target's moment."""
 import json
+import tomllib
+from pathlib import Path
 
 import noise
 from PIL import Image, ImageDraw, ImageFont
@@ -9,20 +11,23 @@ from session import BIN, VirtualStage, run, run_json
 
 SCENE = "tools/stagesim/scenes/motion_demo.toml"
 STAGE = "tools/demo/stage_moving.toml"
-BASIS, CYCLES, FPS = "s159", 3, 24
+BASIS, FPS = "s159", 24
+CYCLES = 6  # half a second: the head turns from one side to the other, speaks a syllable and blinks
 QUALITIES = ["none", "standard"]  # of motion compensation
 SHUTTER_DEG = 180
-EXPOSURE_EV = 1.3
-TICKS_A_MICROSECOND = 125
-COUNTS_PER_US = 2.52  # the default stage's gain
-LABELS = {"none": "no compensation", "standard": "compensated", "blurred": f"compensated, {SHUTTER_DEG}° shutter", "truth": "truth"}
+# Of .cache/assets/env. Where a few lamps give most of the light, what moved between their slots shows; even light hides it.
+ENVIRONMENT, ROTATE_DEG, EXPOSURE_EV = "city", 60, 0
+LABELS = {"none": "not compensated", "standard": "compensated", "truth": "truth"}
+LABEL_PX = 24  # the height of the line under a picture
+SLOWER, COLORS = 2, 128  # than life, and altogether, in the animation
+SHOWN = 5  # pictures of a film in the sequence
 
 
 def record(clock, out):
     """One take a quality: the virtual stage is the same to the bit each time. Gives stagectl's reports."""
     takes = {}
     for quality in QUALITIES:
-        with clock(f"record the moving head ({LABELS[quality]})"):
+        with clock(f"record the moving head ({LABELS[quality]}), every frame rendered: minutes"):
             with VirtualStage(SCENE, STAGE, out / f"stage/moving_{quality}") as stage:
                 takes[quality] = run_json(
                     BIN / "stagectl", "run", "--basis", BASIS, "--cycles", CYCLES, "--fps", FPS, "--quality", quality, "--stage", STAGE,
@@ -31,17 +36,28 @@ def record(clock, out):
     return takes
 
 
-def film(clock, out, light):
-    """Relights every target; the pictures by name of strip."""
+def film(clock, out, environment):
+    """Relights every target, sharp and as a shutter sees it, and renders the scene frozen at its moment; the sharp pictures and
+    the truth's by name of film."""
     folder = out / "moving"
     folder.mkdir(exist_ok=True)
-    light = [*light, "--exposure", EXPOSURE_EV, "--target", "all"]
+    light = ["--env", environment, "--rotate", ROTATE_DEG, "--exposure", EXPOSURE_EV]
+    relit = [*light, "--target", "all"]
     with clock("relight the moving head"):
         for quality in QUALITIES:
-            run(BIN / "rf", "relight", out / f"moving_{quality}.rfa", *light, "-o", folder / f"{quality}.exr", "--png", folder / f"{quality}.png")
-        run(BIN / "rf", "relight", out / "moving_standard.rfa", *light, "--shutter", SHUTTER_DEG, "-o", folder / "blurred.exr",
+            run(BIN / "rf", "relight", out / f"moving_{quality}.rfa", *relit, "-o", folder / f"{quality}.exr", "--png", folder / f"{quality}.png")
+        run(BIN / "rf", "relight", out / "moving_standard.rfa", *relit, "--shutter", SHUTTER_DEG, "-o", folder / "blurred.exr",
             "--png", folder / "blurred.png")
-    return {name: sorted(folder.glob(f"{name}_*.png")) for name in [*QUALITIES, "blurred"]}
+    with clock("render the truth of the moving head"):
+        for n, at_us in enumerate(moments_us(out / "moving_standard.rfa")):
+            run(BIN / "stagesim", "render", SCENE, "--stage", STAGE, *light, "--at-us", at_us, "--unit", "counts",
+                "-o", folder / f"truth_{n:06d}.exr", "--png", folder / f"truth_{n:06d}.png", "--png-gain", 1 / counts_per_us())
+    return {name: sorted(folder.glob(f"{name}_*.png")) for name in LABELS}
+
+
+def counts_per_us():
+    """What a nominal calibration divides by."""
+    return tomllib.loads(Path(STAGE).read_text())["camera"][0]["counts_per_us"]
 
 
 def moments_us(archive):
@@ -50,38 +66,56 @@ def moments_us(archive):
     journal = [json.loads(line) for line in (archive / "journal.jsonl").read_text().splitlines()]
     places = [event["provenance"] for event in journal if event["event"] == "target"]
     numbers = [place["cycle"] * sequence["slots"] + place["slot"] for place in places]
-    return [n * sequence["period_ticks"] / TICKS_A_MICROSECOND + sequence["exposure_us"]["tracking"] / 2 for n in numbers]
+    period_us = 1e6 * sequence["period_ticks"] / sequence["tick_hz"]
+    return [n * period_us + sequence["exposure_us"]["tracking"] / 2 for n in numbers]
 
 
-def compare(clock, out, light):
-    """PSNR of each target in each film against the scene frozen at its moment, in the take's own unit (counts over the stage's
-    gain, which is what a nominal calibration divides by)."""
-    folder = out / "moving"
-    figures = {f"moving_psnr_{quality}_db": [] for quality in QUALITIES}
-    with clock("compare the moving head with the truth"):
-        for n, at_us in enumerate(moments_us(out / "moving_standard.rfa")):
-            truth_file = folder / f"truth_{n:06d}.exr"
-            run(BIN / "stagesim", "render", SCENE, "--stage", STAGE, *light, "--exposure", EXPOSURE_EV, "--at-us", at_us, "--unit", "counts",
-                "-o", truth_file, "--png", folder / f"truth_{n:06d}.png", "--png-gain", 1 / COUNTS_PER_US)
-            truth = noise.read_image(truth_file) / COUNTS_PER_US
-            for quality in QUALITIES:
-                relit = noise.read_image(folder / f"{quality}_{n:06d}.exr")
-                figures[f"moving_psnr_{quality}_db"].append(round(noise.psnr_db(relit, truth), 2))
-    return figures
+def compare(out):
+    """PSNR of each film against the truth, in the take's own unit: of all targets and of each."""
+    folder, figures, by_target = out / "moving", {}, {}
+    for quality in QUALITIES:
+        pairs = [(noise.read_image(relit), noise.read_image(folder / relit.name.replace(quality, "truth")) / counts_per_us())
+                 for relit in sorted(folder.glob(f"{quality}_*.exr"))]
+        by_target[quality] = [round(noise.psnr_db(*pair), 2) for pair in pairs]
+        figures[f"moving_psnr_{quality}_db"] = round(sum(by_target[quality]) / len(pairs), 2)
+    return {**figures, "moving_psnr_by_target_db": by_target}
+
+
+def labelled(picture, label):
+    tile = Image.open(picture).convert("RGB")
+    framed = Image.new("RGB", (tile.width, tile.height + LABEL_PX), "black")
+    framed.paste(tile)
+    if label:
+        ImageDraw.Draw(framed).text((6, tile.height + 3), label, fill="white", font=ImageFont.load_default(15))
+    return framed
+
+
+def beside(tiles):
+    row = Image.new("RGB", (sum(tile.width for tile in tiles), tiles[0].height))
+    for n, tile in enumerate(tiles):
+        row.paste(tile, (n * tile.width, 0))
+    return row
+
+
+def below(rows):
+    sheet = Image.new("RGB", (rows[0].width, sum(row.height for row in rows)))
+    for n, row in enumerate(rows):
+        sheet.paste(row, (0, n * row.height))
+    return sheet
 
 
 def animate(films, path):
-    """Side by side, one film beside the other, at FPS pictures a second, there and back."""
-    frames = []
-    for pictures in zip(*films.values()):
-        tiles = [Image.open(picture).convert("RGB") for picture in pictures]
-        width, height = tiles[0].size
-        frame = Image.new("RGB", (width * len(tiles), height + 24), "black")
-        draw, font = ImageDraw.Draw(frame), ImageFont.load_default(15)
-        for n, (name, tile) in enumerate(zip(films, tiles)):
-            frame.paste(tile, (n * width, 0))
-            draw.text((n * width + 6, height + 3), LABELS[name], fill="white", font=font)
-        frames.append(frame)
+    """The films side by side, there and back; one palette for all pictures, so that nothing flickers."""
+    frames = [beside([labelled(picture, LABELS[name]) for name, picture in zip(films, pictures)]) for pictures in zip(*films.values())]
+    palette = below(frames).quantize(COLORS, dither=Image.Dither.NONE)
+    frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     loop = frames + frames[-2:0:-1]
-    loop[0].save(path, save_all=True, append_images=loop[1:], duration=1000 / FPS * 2, loop=0)
-    return frames
+    loop[0].save(path, save_all=True, append_images=loop[1:], duration=1000 * SLOWER / FPS, loop=0, optimize=True)
+
+
+def sequence(films, path):
+    """The films one below the other: SHOWN moments of each, evenly spaced from the first to the last."""
+    count = len(films["truth"])
+    shown = [round(n * (count - 1) / (SHOWN - 1)) for n in range(SHOWN)]
+    below([beside([labelled(pictures[n], LABELS[name] if column == 0 else "") for column, n in enumerate(shown)])
+           for name, pictures in films.items()]).save(path, quality=90, subsampling=0)

@@ -39,18 +39,18 @@ class _Step:
         self.clock.steps[self.name] = round(self.clock.steps.get(self.name, 0) + spent, 2)
 
 
-def run(*command, log=None):
-    """Runs a program of the project and returns what it printed; on failure, ends the demo with its own words."""
-    done = subprocess.run([str(part) for part in command], cwd=ROOT, capture_output=True, text=True)
-    if log:
-        Path(log).write_text(done.stdout + done.stderr)
+def run(*command):
+    """Runs a program of the project and returns what it printed; on failure, ends the demo with its own words. On a terminal its
+    progress shows."""
+    errors = None if sys.stderr.isatty() else subprocess.PIPE
+    done = subprocess.run([str(part) for part in command], cwd=ROOT, stdout=subprocess.PIPE, stderr=errors, text=True)
     if done.returncode != 0:
-        sys.exit(f"demo: this failed with exit code {done.returncode}:\n  {' '.join(map(str, command))}\n{done.stdout}{done.stderr}")
+        sys.exit(f"demo: this failed with exit code {done.returncode}:\n  {' '.join(map(str, command))}\n{done.stdout}{done.stderr or ''}")
     return done.stdout
 
 
-def run_json(*command, log=None):
-    return json.loads(run(*command, log=log))
+def run_json(*command):
+    return json.loads(run(*command))
 
 
 class VirtualStage:
