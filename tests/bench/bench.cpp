@@ -38,6 +38,7 @@ double now_ms(clockid_t clock) {
 }
 
 double time_of(const Setting& setting) {
+    if (setting.prepare) setting.prepare();
     const clockid_t clock = setting.threads == 1 ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC;
     const double begin = now_ms(clock);
     setting.run();
@@ -126,6 +127,7 @@ void Bench::measure(const Knob& knob) {
                     {"default", knob.default_setting},
                     {"why_off_front", knob.why_off_front},
                     {"differs_by_machine", knob.differs_by_machine},
+                    {"table", knob.table},
                     {"settings", names}});
         return;
     }
@@ -133,11 +135,13 @@ void Bench::measure(const Knob& knob) {
     std::vector<double> errors;
     std::vector<std::optional<uint64_t>> bytes;
     for (const auto& setting : knob.settings) {
+        if (setting.prepare) setting.prepare();
         bytes.push_back(peak_bytes_of(setting.run));
         errors.push_back(setting.error());
     }
     std::vector<std::vector<double>> times(count);
-    for (int round = 0; round < rounds_; ++round)
+    const int rounds = std::min(rounds_, knob.most_rounds);
+    for (int round = 0; round < rounds; ++round)
         for (size_t k = 0; k < count; ++k) {
             const size_t i = (k + size_t(round)) % count;
             times[i].push_back(time_of(knob.settings[i]));
@@ -156,7 +160,7 @@ void Bench::measure(const Knob& knob) {
                     {"ms_median", timings[i].ms_median},
                     {"ratio_to_peer", timings[i].ratio_to_peer},
                     {"threads", setting.threads},
-                    {"rounds", rounds_},
+                    {"rounds", rounds},
                     {"bytes", bytes[i] ? Json(*bytes[i]) : Json()}});
     }
 }

@@ -15,6 +15,10 @@ namespace ols {
 // moment, `Renderer::light` gives the truth of what is made of that slot.
 double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32_t cycle, size_t slot);
 
+// The frame that the camera delivers of a slot: one of render_slots(), rendered alone. Null where the camera is not triggered.
+Result<std::shared_ptr<const Frame>> render_slot(Renderer& renderer, const Setup& setup, const Sequence& sequence,
+                                                 uint32_t cycle, size_t slot);
+
 // The frames that the camera delivers of a cycle, by slot, each identified and with the noise of its place in the take;
 // null where the camera is not triggered. Frames are the same, to the bit, as those of VirtualCamera, and do not depend
 // on which cycles were rendered before. `renderer` must be made of `setup`.
