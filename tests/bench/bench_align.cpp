@@ -11,6 +11,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "align_limit.hpp"
 #include "align_score.hpp"
 #include "align_sheet.hpp"
 #include "bench.hpp"
@@ -24,6 +25,7 @@ constexpr const char* bases[] = {"single", "triangle", "s159"};
 constexpr const char* by = "`stagectl run --quality`";
 constexpr const char* relit_table = "PSNR relit, dB";
 constexpr const char* flow_table = "endpoint error of long-range flow, px";
+constexpr const char* limit_table = "PSNR of frames in full colour without noise, dB";
 constexpr const char* part_table = "one target of 640 x 480, s159, core-milliseconds";
 
 // Settings were chosen on the first four, and are reported on all.
@@ -34,6 +36,7 @@ struct Take {
     Recording recording;
     std::unique_ptr<TrueTarget> truth;  // of the first target
     MotionPath true_path;               // of the first target
+    std::unique_ptr<Recording> frozen;
 };
 
 void stop(const std::string& message) {
@@ -67,11 +70,17 @@ class Takes {
         const std::string kept_in = full_ ? folder : "";
         auto recording = record(plan, kept_in);
         if (!recording) stop(recording.error().message);
-        auto take = std::make_unique<Take>(Take{plan, std::move(*recording), {}, {}});
+        auto take = std::make_unique<Take>(Take{plan, std::move(*recording), {}, {}, {}});
         const auto lamps = true_lamps(take->recording, plan, kept_in);
         if (!lamps) stop(lamps.error().message);
         take->truth = std::make_unique<TrueTarget>(take->recording, *lamps);
         take->true_path = true_path(take->recording, 0);
+        if (plan.targets > 1) return take;
+        RecordingPlan frozen_plan = plan;
+        frozen_plan.is_frozen = true;
+        auto frozen = record(frozen_plan, kept_in);
+        if (!frozen) stop(frozen.error().message);
+        take->frozen = std::make_unique<Recording>(std::move(*frozen));
         return take;
     }
 
@@ -93,6 +102,10 @@ Target developed(MotionDeveloper& developer, const Recording& recording, size_t 
     return std::move(*made);
 }
 
+Target first_target(const Recording& recording, const std::string& quality, const MotionPath* path = nullptr) {
+    return developed(*developer(recording, quality), recording, 0, path);
+}
+
 // 100 at a PSNR of 0 dB.
 double percent_of_peak(double psnr_db) {
     return 100 * std::pow(10, -psnr_db / 20);
@@ -103,19 +116,17 @@ std::vector<SheetPicture> measure_relit(Bench& bench, const std::string& name, c
     Target target;
     std::vector<SheetPicture> pictures;
     std::vector<Setting> settings;
-    const auto add = [&](const std::string& setting, const std::string& quality, bool is_true) {
-        settings.push_back({setting,
-                            [&target, take, quality, is_true] {
-                                const auto made = developer(take->recording, quality);
-                                target = developed(*made, take->recording, 0, is_true ? &take->true_path : nullptr);
-                            },
+    const auto add = [&](const std::string& setting, const std::function<Target()>& develop) {
+        settings.push_back({setting, [&target, develop] { target = develop(); },
                             [&, take, setting] {
                                 pictures.push_back({setting, take->truth->relit(target, lightings()[1])});
                                 return percent_of_peak(take->truth->psnr_db(target));
                             }});
     };
-    for (const std::string& quality : motion_quality_names()) add(quality, quality, false);
-    add("true flow", "final", true);
+    for (const std::string& quality : motion_quality_names())
+        add(quality, [take, quality] { return first_target(take->recording, quality); });
+    add("true flow", [take] { return first_target(take->recording, "final", &take->true_path); });
+    add("frozen", [take] { return first_target(*take->frozen, "none"); });
     bench.measure({.name = name,
                    .set_by = by,
                    .error_unit = "% of peak rms",
@@ -134,6 +145,22 @@ void write_sheets(const std::string& scene, const Take& take, const std::vector<
     const Status written = write_align_sheet(fmt::format("out/bench/align_{}.png", scene), take.truth->relit_truth(1),
                                              take.recording.camera().cfa, pictures, box, scene == "blink" ? 6 : 3);
     if (!written) stop(written.error().message);
+}
+
+// What the true flow does for a scene where nothing else is in its way.
+void measure_limit(Bench& bench, const std::string& scene, const Take* take) {
+    AlignLimit limit;
+    const auto run = [&limit, take] { limit = align_limit(take->recording, take->true_path); };
+    bench.measure(
+        {.name = scene,
+         .set_by = by,
+         .error_unit = "% of peak rms",
+         .peer = "as they stand",
+         .default_setting = "moved by the true flow",
+         .settings = {{"as they stand", run, [&limit] { return percent_of_peak(limit.still_psnr_db); }},
+                      {"moved by the true flow", run, [&limit] { return percent_of_peak(limit.moved_psnr_db); }}},
+         .table = limit_table,
+         .most_rounds = 1});
 }
 
 // The flow from a target to the tracking frames farthest from it.
@@ -260,6 +287,7 @@ int main(int argc, char** argv) {
             const auto pictures = measure_relit(bench, scene + ", " + basis, one);
             if (bench.full() && bench.measures() && basis == "s159") write_sheets(scene, *one, pictures);
         }
+        measure_limit(bench, scene, take(plan_of(scene, "s159")));
         measure_flow(bench, scene, take(plan_of(scene, "s159")));
     }
     return bench.finish();
