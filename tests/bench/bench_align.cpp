@@ -142,7 +142,7 @@ std::vector<SheetPicture> measure_relit(Bench& bench, const std::string& name, c
 // The scenes whose pictures are to be looked at: a moving head, and the lids in the middle of it, enlarged.
 void write_sheets(const std::string& scene, const Take& take, const std::vector<SheetPicture>& pictures) {
     if (scene != "turn60" && scene != "blink") return;
-    const Box box = scene == "blink" ? Box{128, 126, 60, 30} : Box{100, 70, 120, 140};
+    const Box box = scene == "blink" ? Box{130, 98, 60, 30} : Box{100, 70, 120, 140};
     const Status written = write_align_sheet(fmt::format("out/bench/align_{}.png", scene), take.truth->relit_truth(1),
                                              take.recording.camera().cfa, pictures, box, scene == "blink" ? 6 : 3);
     if (!written) stop(written.error().message);
