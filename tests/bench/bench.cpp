@@ -38,7 +38,6 @@ double now_ms(clockid_t clock) {
 }
 
 double time_of(const Setting& setting) {
-    if (setting.prepare) setting.prepare();
     const clockid_t clock = setting.threads == 1 ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC;
     const double begin = now_ms(clock);
     setting.run();
@@ -134,16 +133,19 @@ void Bench::measure(const Knob& knob) {
 
     std::vector<double> errors;
     std::vector<std::optional<uint64_t>> bytes;
-    for (const auto& setting : knob.settings) {
-        if (setting.prepare) setting.prepare();
-        bytes.push_back(peak_bytes_of(setting.run));
-        errors.push_back(setting.error());
-    }
     std::vector<std::vector<double>> times(count);
     const int rounds = std::min(rounds_, knob.most_rounds);
-    for (int round = 0; round < rounds; ++round)
+    for (size_t i = 0; i < count; ++i) {
+        const Setting& setting = knob.settings[i];
+        if (setting.prepare) setting.prepare();
+        bytes.push_back(peak_bytes_of([&] { times[i] = {time_of(setting)}; }));
+        errors.push_back(setting.error());
+    }
+    if (knob.most_rounds > 1) times.assign(count, {});
+    for (int round = 0; round < rounds && knob.most_rounds > 1; ++round)
         for (size_t k = 0; k < count; ++k) {
             const size_t i = (k + size_t(round)) % count;
+            if (knob.settings[i].prepare) knob.settings[i].prepare();
             times[i].push_back(time_of(knob.settings[i]));
         }
     const auto timings = compare_times(times, peer);

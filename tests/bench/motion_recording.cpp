@@ -84,16 +84,23 @@ Setup setup_of(const Recording& recording) {
     return {recording.scene, recording.stage, recording.camera(), true};
 }
 
-// The first frame rendered says what all are like; a file holds ticks and samples of each, in the order of their numbers.
+double time_us(const Recording& recording, uint64_t number) {
+    const uint64_t length = recording.sequence.slots.size();
+    return slot_time_us(recording.sequence, recording.camera(), uint32_t(number / length), number % length);
+}
+
+// In the order of their numbers; a file holds their samples.
 using Frames = std::vector<std::shared_ptr<const Frame>>;
 
-Result<Frames> render(const Recording& recording, const std::vector<uint64_t>& numbers, const std::string& label) {
+Result<Frames> render(const Recording& recording, const std::vector<uint64_t>& numbers, std::optional<double> frozen_us,
+                      const std::string& label) {
     const Setup setup = setup_of(recording);
     const uint64_t length = recording.sequence.slots.size();
     Renderer renderer(setup, {});
     Frames frames;
     for (const uint64_t number : numbers) {
-        auto frame = render_slot(renderer, setup, recording.sequence, uint32_t(number / length), number % length);
+        auto frame =
+            render_slot(renderer, setup, recording.sequence, uint32_t(number / length), number % length, frozen_us);
         if (!frame) return frame.error();
         frames.push_back(std::move(*frame));
         show_progress(label.c_str(), double(frames.size()) / double(numbers.size()));
@@ -119,8 +126,10 @@ Frame blank(const Recording& recording, uint64_t number) {
 }
 
 Result<Frames> read_or_render(const Recording& recording, const RecordingPlan& plan,
-                              const std::vector<uint64_t>& numbers, const std::string& folder) {
-    const std::string path = path_of(plan, folder, plan.basis) + ".u16";
+                              const std::vector<uint64_t>& numbers, std::optional<double> frozen_us,
+                              const std::string& folder) {
+    const std::string what = plan.basis + (frozen_us ? "-frozen" : "");
+    const std::string path = path_of(plan, folder, what) + ".u16";
     const size_t bytes = size_t(plan.width) * size_t(plan.height) * sizeof(uint16_t);
     std::vector<Frame> kept;
     for (const uint64_t number : numbers) kept.push_back(blank(recording, number));
@@ -130,7 +139,7 @@ Result<Frames> read_or_render(const Recording& recording, const RecordingPlan& p
         for (Frame& frame : kept) frames.push_back(std::make_shared<const Frame>(std::move(frame)));
         return frames;
     }
-    auto frames = render(recording, numbers, std::filesystem::path(plan.scene).stem().string() + " " + plan.basis);
+    auto frames = render(recording, numbers, frozen_us, std::filesystem::path(plan.scene).stem().string() + " " + what);
     if (!frames || folder.empty()) return frames;
     const Status written =
         write_records(path, frames->size(), bytes, [&](size_t i) { return (const char*)(*frames)[i]->samples.data(); });
@@ -141,8 +150,7 @@ Result<Frames> read_or_render(const Recording& recording, const RecordingPlan& p
 }  // namespace
 
 double Recording::target_us(size_t target) const {
-    const uint64_t number = targets[target].basis.target, length = sequence.slots.size();
-    return slot_time_us(sequence, camera(), uint32_t(number / length), number % length);
+    return time_us(*this, targets[target].basis.target);
 }
 
 Result<Recording> record(const RecordingPlan& plan, const std::string& folder) {
@@ -162,7 +170,9 @@ Result<Recording> record(const RecordingPlan& plan, const std::string& folder) {
     std::vector<uint64_t> numbers;
     for (uint64_t number = range.first; number <= range.last; ++number)
         if (is_needed(recording.sequence, number)) numbers.push_back(number);
-    auto frames = read_or_render(recording, plan, numbers, folder);
+    std::optional<double> frozen_us;
+    if (plan.is_frozen) frozen_us = time_us(recording, range.first_target);
+    auto frames = read_or_render(recording, plan, numbers, frozen_us, folder);
     if (!frames) return frames.error();
     FrameStore store(recording.sequence);
     for (auto& frame : *frames) store.add(std::move(frame));

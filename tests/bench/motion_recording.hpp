@@ -21,6 +21,7 @@ struct RecordingPlan {
     // of half a cycle on either side of them.
     uint32_t cycle = 2;
     int targets = 1;
+    bool is_frozen = false;  // at the first target's moment: nothing but noise is left
 };
 
 // With nominal calibration and, where the sequence states none, the exposure that `stagectl basis report` proposes.

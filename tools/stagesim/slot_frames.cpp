@@ -61,7 +61,7 @@ double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32
 }
 
 Result<std::shared_ptr<const Frame>> render_slot(Renderer& renderer, const Setup& setup, const Sequence& sequence,
-                                                 uint32_t cycle, size_t number) {
+                                                 uint32_t cycle, size_t number, std::optional<double> frozen_us) {
     const Slot& slot = sequence.slots[number];
     if (!triggers(slot, setup.camera)) return std::shared_ptr<const Frame>();
     if (slot.planes > 0)
@@ -69,8 +69,8 @@ Result<std::shared_ptr<const Frame>> render_slot(Renderer& renderer, const Setup
             fmt::format("slot {} has grey levels, which only the board lays out in time: use stagesim run", number));
     const uint64_t trigger = cycle * triggers_before(sequence, setup.camera, sequence.slots.size()) +
                              triggers_before(sequence, setup.camera, number);
-    const Exposure exposure =
-        renderer.expose(lit_microseconds(slot), slot_time_us(sequence, setup.camera, cycle, number), trigger, 0);
+    const double time_us = frozen_us ? *frozen_us : slot_time_us(sequence, setup.camera, cycle, number);
+    const Exposure exposure = renderer.expose(lit_microseconds(slot), time_us, trigger, 0);
     auto frame = std::make_shared<Frame>(make_frame(exposure, setup.camera, renderer.effects()));
     frame->identified = true;
     frame->cycle = cycle, frame->slot = uint32_t(number);
