@@ -2,18 +2,35 @@
 // What no alignment undoes: a subject that turns is lit anew, and what it hides comes to light.
 #pragma once
 
+#include <vector>
+
 #include "motion_recording.hpp"
 
 namespace ols {
 
 // The scene in full colour at each pixel, under the lamps of the first of lightings(), without noise and without a basis, at the
-// moments of the tracking frames around a target: how near it is to the target's moment as it stands, and when every pixel is
-// taken from where the true flow leads (bilinear).
-struct AlignLimit {
-    double still_psnr_db = 0, moved_psnr_db = 0;
-};
+// moments of the tracking frames around the first target: PSNR against the target's moment, as TrueTarget's.
+class AlignLimit {
+  public:
+    AlignLimit(const Recording& recording, const MotionPath& true_path);
 
-// `path`: true_path() of the first target. Over the pixels whose point is visible at either moment. PSNR as TrueTarget's.
-AlignLimit align_limit(const Recording& recording, const MotionPath& path);
+    // Which pixels count: those whose point is visible at either moment, or of these only those that are three pixels or
+    // more from any other, where outlines have no say.
+    enum class Where { visible, inside };
+
+    // When every pixel is taken from where `path` leads (bilinear).
+    double moved_db(const MotionPath& path, Where where) const;
+    // As the pictures stand.
+    double still_db(Where where) const;
+
+  private:
+    template <typename Moved>
+    double psnr_db(const Moved& moved, Where where) const;
+
+    Image truth_;
+    double peak_;
+    std::vector<Image> others_;                                 // by knot; the instant's is empty
+    std::vector<std::vector<unsigned char>> visible_, inside_;  // by knot
+};
 
 }  // namespace ols

@@ -25,6 +25,13 @@ double percentile(std::vector<float> values, double share) {
     return double(*at);
 }
 
+template <typename Images>
+std::vector<const float*> pointers(const Images& images) {
+    std::vector<const float*> out;
+    for (const auto& image : images) out.push_back(image.data());
+    return out;
+}
+
 double middle_tick(const Frame& frame) {
     return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
 }
@@ -70,19 +77,19 @@ TrueTarget::TrueTarget(const Recording& recording, const std::vector<std::vector
     : width_(recording.camera().width),
       height_(recording.camera().height),
       lights_(image_lights(recording.sequence.basis, recording.stage.lamps)) {
-    std::vector<std::vector<float>> images;
+    std::vector<float> peaks;
     for (const std::vector<int>& of_image : recording.sequence.basis.image_lamps) {
-        std::vector<float>& image = images.emplace_back(lamps[0].size());
+        std::vector<float>& image = images_.emplace_back(lamps[0].size());
         for (const int lamp : of_image)
             for (size_t p = 0; p < image.size(); ++p) image[p] += lamps[size_t(lamp)][p] / float(of_image.size());
+        peaks.push_back(float(percentile(image, 0.999)));
     }
-    std::vector<const float*> planes;
-    for (const auto& image : images) planes.push_back(image.data());
-    const Image everything = mixed(planes, std::vector<double>(planes.size(), 1.0));
+    image_peak_ = double(std::ranges::max(peaks));
+    const Image everything = mixed(pointers(images_), std::vector<double>(images_.size(), 1.0));
     const double bright = percentile(everything.data, 0.999);
     for (const float v : everything.data) subject_.push_back(v > 0.02 * bright);
     for (const Lighting& lighting : lightings()) {
-        truth_.push_back(mixed(planes, weights(lighting)));
+        truth_.push_back(mixed(pointers(images_), weights(lighting)));
         peaks_.push_back(percentile(truth_.back().data, 0.999));
     }
 }
@@ -102,21 +109,36 @@ Image TrueTarget::mixed(const std::vector<const float*>& images, const std::vect
 
 Image TrueTarget::relit(const Target& target, const Lighting& lighting) const {
     assert(target.planes() == 1 && target.lamps.size() == lights_.size());
-    std::vector<const float*> images;
-    for (const auto& lamp : target.lamps) images.push_back(lamp.data());
-    return mixed(images, weights(lighting));
+    return mixed(pointers(target.lamps), weights(lighting));
+}
+
+double TrueTarget::relit_rms(const Target& target, size_t lighting, const std::vector<unsigned char>& among) const {
+    const Image image = relit(target, lightings()[lighting]);
+    double squares = 0, count = 0;
+    for (size_t p = 0; p < among.size(); ++p)
+        if (among[p]) squares += std::pow(double(image.data[p]) - double(truth_[lighting].data[p]), 2), ++count;
+    return std::sqrt(squares / count);
 }
 
 double TrueTarget::psnr_db(const Target& target) const {
     double sum = 0;
-    for (size_t l = 0; l < truth_.size(); ++l) {
-        const Image image = relit(target, lightings()[l]);
-        double squares = 0, count = 0;
-        for (size_t p = 0; p < subject_.size(); ++p)
-            if (subject_[p]) squares += std::pow(double(image.data[p]) - double(truth_[l].data[p]), 2), ++count;
-        sum += 20 * std::log10(peaks_[l] / std::sqrt(squares / count));
-    }
+    for (size_t l = 0; l < truth_.size(); ++l) sum += 20 * std::log10(peaks_[l] / relit_rms(target, l, subject_));
     return sum / double(truth_.size());
+}
+
+double TrueTarget::relit_percent(const Target& target, const std::vector<unsigned char>& among) const {
+    double sum = 0;
+    for (size_t l = 0; l < truth_.size(); ++l) sum += 100 * relit_rms(target, l, among) / peaks_[l];
+    return sum / double(truth_.size());
+}
+
+double TrueTarget::images_percent(const Target& target, const std::vector<unsigned char>& among) const {
+    assert(target.planes() == 1 && target.lamps.size() == images_.size());
+    double squares = 0, count = 0;
+    for (size_t i = 0; i < images_.size(); ++i)
+        for (size_t p = 0; p < among.size(); ++p)
+            if (among[p]) squares += std::pow(double(target.lamps[i][p]) - double(images_[i][p]), 2), ++count;
+    return 100 * std::sqrt(squares / count) / image_peak_;
 }
 
 MotionPath true_path(const Recording& recording, size_t target) {
@@ -151,8 +173,10 @@ Result<MotionPath> found_path(const Recording& recording, size_t target, const M
     const TargetFrames& frames = recording.targets[target];
     TrackingFlows flows(quality.flow);
     for (const TargetFrames::Tracking& one : frames.tracking) {
-        const Status added = flows.add(middle_tick(*one.frame), tracking_image(*one.frame, recording.calibration.black,
-                                                                               recording.calibration.flat));
+        const CameraCalibration& calibration = recording.calibration;
+        const Status added =
+            flows.add(middle_tick(*one.frame), tracking_image(*one.frame, calibration.black, calibration.flat),
+                      tracking_noise(*one.frame, calibration.black, calibration.flat, recording.camera().noise));
         if (!added) return added.error();
     }
     double from = middle_tick(*frames.frames.front()), to = from;
@@ -163,11 +187,16 @@ Result<MotionPath> found_path(const Recording& recording, size_t target, const M
     return flows.path(MotionDeveloper::instant_of(frames, recording.sequence), from, to);
 }
 
-PathError path_error(const MotionPath& found, const MotionPath& truth, const std::vector<unsigned char>& subject) {
-    assert(found.size() == truth.size());
+PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots,
+                     const std::vector<unsigned char>& subject) {
+    assert(!found || found->size() == truth.size());
+    const auto instant = size_t(std::ranges::find_if(truth, &MotionKnot::is_instant) - truth.begin());
+    const bool is_near = knots == Knots::nearest;
     std::vector<float> errors;
-    for (const size_t k : {size_t(0), truth.size() - 1}) {
-        const FlowField &exact = truth[k].flow, estimate = resized(found[k].flow, exact.width, exact.height);
+    for (const size_t k : {is_near ? instant - 1 : 0, is_near ? instant + 1 : truth.size() - 1}) {
+        const FlowField& exact = truth[k].flow;
+        FlowField estimate(exact.width, exact.height);
+        if (found) estimate = resized((*found)[k].flow, exact.width, exact.height);
         for (size_t p = 0; p < exact.size(); ++p)
             if (subject[p] && truth[k].confidence[p] > 0)
                 errors.push_back(std::hypot(estimate.u[p] - exact.u[p], estimate.v[p] - exact.v[p]));
@@ -175,6 +204,29 @@ PathError path_error(const MotionPath& found, const MotionPath& truth, const std
     double sum = 0;
     for (const float error : errors) sum += double(error);
     return {sum / double(errors.size()), percentile(std::move(errors), 0.95)};
+}
+
+CycleMotion cycle_motion(const MotionPath& truth, const std::vector<unsigned char>& subject) {
+    const FlowField &first = truth.front().flow, &last = truth.back().flow;
+    CycleMotion motion;
+    double sum = 0, count = 0;
+    for (size_t p = 0; p < subject.size(); ++p) {
+        if (!subject[p]) continue;
+        const double px = std::hypot(double(last.u[p] - first.u[p]), double(last.v[p] - first.v[p]));
+        motion.most_px = std::max(motion.most_px, px);
+        sum += px, ++count;
+    }
+    motion.mean_px = sum / count;
+    return motion;
+}
+
+std::vector<unsigned char> moving_pixels(const MotionPath& truth, const std::vector<unsigned char>& subject) {
+    std::vector<unsigned char> moving(subject.size());
+    for (const MotionKnot& knot : truth)
+        for (size_t p = 0; p < subject.size(); ++p)
+            if (subject[p] && (knot.confidence[p] == 0 || std::hypot(knot.flow.u[p], knot.flow.v[p]) > 0.25f))
+                moving[p] = 1;
+    return moving;
 }
 
 }  // namespace ols

@@ -42,22 +42,28 @@ cv::Mat difference(const Image& mosaic, const Image& truth, double peak) {
 
 }  // namespace
 
-Status write_align_sheet(const std::string& path, const Image& truth, Cfa cfa,
-                         const std::vector<SheetPicture>& pictures, const Box& box, int enlarge) {
-    const double peak = peak_of(truth.data);
+Status write_align_sheet(const std::string& path, Cfa cfa, const std::vector<SheetBand>& bands, const Box& box,
+                         int enlarge) {
     const int width = box.width * enlarge, height = box.height * enlarge, tall = height + title_height;
-    cv::Mat sheet(2 * tall, width * int(pictures.size() + 1), CV_8UC3, cv::Scalar::all(0));
-    const auto paste = [&](const cv::Mat& whole, size_t column, int row, const std::string& title, int how) {
+    cv::Mat sheet(2 * tall * int(bands.size()), width * int(bands.front().pictures.size() + 1), CV_8UC3,
+                  cv::Scalar::all(0));
+    const auto paste = [&](const cv::Mat& whole, size_t column, size_t row, const std::string& title, int how) {
+        const int x = int(column) * width, y = int(row) * tall;
         cv::Mat large;
         cv::resize(whole(cv::Rect(box.x, box.y, box.width, box.height)), large, cv::Size(width, height), 0, 0, how);
-        large.copyTo(sheet(cv::Rect(int(column) * width, row * tall + title_height, width, height)));
-        cv::putText(sheet, title, cv::Point(int(column) * width + 4, row * tall + title_height - 5),
-                    cv::FONT_HERSHEY_SIMPLEX, 0.42, cv::Scalar::all(255), 1, cv::LINE_AA);
+        large.copyTo(sheet(cv::Rect(x, y + title_height, width, height)));
+        cv::putText(sheet, title, cv::Point(x + 4, y + title_height - 5), cv::FONT_HERSHEY_SIMPLEX, 0.42,
+                    cv::Scalar::all(255), 1, cv::LINE_AA);
     };
-    paste(picture(truth, cfa, peak), 0, 0, "truth", cv::INTER_CUBIC);
-    for (size_t i = 0; i < pictures.size(); ++i) {
-        paste(picture(pictures[i].relit, cfa, peak), i + 1, 0, pictures[i].name, cv::INTER_CUBIC);
-        paste(difference(pictures[i].relit, truth, peak), i + 1, 1, pictures[i].name + " - truth", cv::INTER_NEAREST);
+    for (size_t b = 0; b < bands.size(); ++b) {
+        const SheetBand& band = bands[b];
+        const double peak = peak_of(band.truth.data);
+        paste(picture(band.truth, cfa, peak), 0, 2 * b, band.name + ": truth", cv::INTER_CUBIC);
+        for (size_t i = 0; i < band.pictures.size(); ++i) {
+            const SheetPicture& one = band.pictures[i];
+            paste(picture(one.relit, cfa, peak), i + 1, 2 * b, one.name, cv::INTER_CUBIC);
+            paste(difference(one.relit, band.truth, peak), i + 1, 2 * b + 1, one.name + " - truth", cv::INTER_NEAREST);
+        }
     }
     return write_png(path, sheet.cols, sheet.rows, {sheet.data, sheet.total() * 3});
 }

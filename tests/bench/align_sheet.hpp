@@ -15,9 +15,17 @@ struct SheetPicture {
     Image relit;  // a mosaic, in the truth's unit
 };
 
-// A PNG of two rows: the truth and the pictures, demosaiced, cut to `box` and enlarged; below each its difference to the truth in
-// every pixel of the mosaic, grey where there is none, black and white 10 % of the truth's 99.9th percentile off.
-Status write_align_sheet(const std::string& path, const Image& truth, Cfa cfa,
-                         const std::vector<SheetPicture>& pictures, const Box& box, int enlarge);
+// One basis: its truth, and what became of it.
+struct SheetBand {
+    std::string name;
+    Image truth;
+    std::vector<SheetPicture> pictures;
+};
+
+// A PNG with two rows for each band: the truth and the pictures, demosaiced, cut to `box` and enlarged; below each its difference to
+// the truth in every pixel of the mosaic, grey where there is none, black and white 10 % of the truth's 99.9th percentile off. All
+// bands have as many pictures.
+Status write_align_sheet(const std::string& path, Cfa cfa, const std::vector<SheetBand>& bands, const Box& box,
+                         int enlarge);
 
 }  // namespace ols

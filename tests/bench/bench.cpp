@@ -127,6 +127,7 @@ void Bench::measure(const Knob& knob) {
                     {"why_off_front", knob.why_off_front},
                     {"differs_by_machine", knob.differs_by_machine},
                     {"table", knob.table},
+                    {"table_note", knob.table_note},
                     {"settings", names}});
         return;
     }

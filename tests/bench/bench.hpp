@@ -52,6 +52,7 @@ struct Knob {
     // Where many knobs have the same settings: the table of the docs that shows all of them, each in a line, by their figure
     // alone (`error`, in its unit). Else empty.
     std::string table = "";
+    std::string table_note = "";  // what that table shows, above it; the same for all its knobs
     int most_rounds = 1000;  // for settings that take seconds; 1: the run that the error is of is timed
 };
 

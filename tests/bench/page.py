@@ -65,7 +65,8 @@ def table(title, knobs, rows):
     """A line a knob, a column a setting."""
     default, settings = knobs[0]["default"], knobs[0]["settings"]
     head = [f"**{setting}**" if setting == default else setting for setting in settings]
-    text = f"\n| {title} | " + " | ".join(head) + " |\n| --- |" + " --- |" * len(head) + "\n"
+    note = knobs[0]["table_note"]
+    text = (f"\n{note}\n" if note else "") + f"\n| {title} | " + " | ".join(head) + " |\n| --- |" + " --- |" * len(head) + "\n"
     for knob in knobs:
         by_setting = {row["setting"]: row for row in rows_of(knob, rows)}
         text += f"| {knob['knob']} | " + " | ".join(figure_text(by_setting[setting]) for setting in settings) + " |\n"

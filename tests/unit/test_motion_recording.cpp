@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -113,19 +114,31 @@ TEST_F(MotionRecording, scores_a_constant_offset_as_its_closed_form_says) {
     const TrueTarget truth(*recording, *lamps);
     Target target;
     target.cfa = recording->camera().cfa;
-    target.lamps = *lamps;
+    for (const auto& lamp : *lamps) target.lamps.emplace_back(lamp.begin(), lamp.end());
     EXPECT_TRUE(std::isinf(truth.psnr_db(target)) || truth.psnr_db(target) > 120);
     constexpr float offset = 0.01f;
     for (auto& lamp : target.lamps)
         for (float& v : lamp) v += offset;
-    double expected = 0;
+    double expected = 0, expected_percent = 0;
     for (size_t l = 0; l < lightings().size(); ++l) {
         double weights = 0;
         for (const LightPosition& lamp : recording->stage.lamps) weights += lightings()[l].weight(lamp.direction);
         EXPECT_GT(weights, 0);
         expected += 20 * std::log10(truth.peak(l) / (double(offset) * weights)) / double(lightings().size());
+        expected_percent += 100 * double(offset) * weights / truth.peak(l) / double(lightings().size());
     }
     EXPECT_NEAR(truth.psnr_db(target), expected, 0.01);
+    std::vector<unsigned char> one(truth.subject().size());
+    one[one.size() / 2] = 1;
+    EXPECT_NEAR(truth.relit_percent(target, one), expected_percent, 1e-3);
+    for (auto& lamp : target.lamps) lamp[0] += 1;
+    EXPECT_NEAR(truth.relit_percent(target, one), expected_percent, 1e-3) << "another pixel";
+    std::vector<float> peaks;
+    for (auto lamp : *lamps) {
+        std::ranges::sort(lamp);
+        peaks.push_back(lamp[size_t(0.999 * double(lamp.size() - 1))]);
+    }
+    EXPECT_NEAR(truth.images_percent(target, one), 100 * double(offset) / double(std::ranges::max(peaks)), 1e-3);
 }
 
 // The ball moves by 0.4 m/s; its front is 1.48 m from the camera.
@@ -158,18 +171,62 @@ TEST_F(MotionRecording, path_error_is_that_of_the_first_and_the_last_knot_where_
         found[3].flow.u[p] += 100;
         if (!subject[p]) found[0].flow.u[p] += 1000;
     }
-    const PathError error = path_error(found, truth, subject);
+    const PathError error = path_error(&found, truth, Knots::farthest, subject);
     EXPECT_NEAR(error.mean, 5, 1e-4);
     EXPECT_NEAR(error.percentile_95, 5, 1e-4);
+    EXPECT_EQ(path_error(&found, truth, Knots::nearest, subject).mean, 0);
+}
+
+// Its front moves as far in a cycle as 0.4 m/s leads in five groups of 18 slots on either side; its rim is farther away.
+TEST_F(MotionRecording, motion_of_a_cycle_is_that_of_the_ball_and_without_a_flow_half_of_it_is_the_error) {
+    const auto recording = record(plan_, "");
+    const MotionPath truth = true_path(*recording, 0);
+    std::vector<unsigned char> ball(truth[0].flow.size());
+    for (size_t p = 0; p < ball.size(); ++p) ball[p] = truth[0].confidence[p] > 0 && truth.back().confidence[p] > 0;
+    const CameraConfig& camera = recording->camera();
+    const double cycle_m = 0.4 * 180 * 57870 * 8e-9;
+    const auto pixels = [&](double away_m) {
+        return cycle_m * camera.height / 2.0 / (away_m * std::tan(camera.vertical_fov_deg / 2 * M_PI / 180));
+    };
+    const CycleMotion motion = cycle_motion(truth, ball);
+    EXPECT_NEAR(motion.most_px, pixels(1.48), 0.02);
+    EXPECT_LT(motion.mean_px, pixels(1.48));
+    EXPECT_GT(motion.mean_px, pixels(1.60));
+    EXPECT_NEAR(path_error(nullptr, truth, Knots::farthest, ball).mean, motion.mean_px / 2, 0.01);
+    EXPECT_EQ(moving_pixels(truth, ball), ball) << "all of it moves by more than a quarter of a pixel";
+    MotionPath still = truth;
+    for (MotionKnot& knot : still) {
+        knot.flow = FlowField(knot.flow.width, knot.flow.height);
+        knot.confidence.assign(ball.size(), 1.0f);
+    }
+    still[2].confidence[ball.size() / 2] = 0;
+    std::vector<unsigned char> hidden(ball.size());
+    hidden[ball.size() / 2] = ball[ball.size() / 2];
+    EXPECT_EQ(moving_pixels(still, ball), hidden);
+}
+
+TEST_F(MotionRecording, path_as_it_is_found_makes_the_target_that_the_developer_makes) {
+    const auto recording = record(plan_, "");
+    MotionQuality quality = *motion_quality("standard");
+    const auto developed = [&](const MotionPath* path) {
+        MotionDeveloper developer(recording->sequence, recording->calibration, recording->camera().noise, {}, quality);
+        return developer.develop(recording->targets[0], path);
+    };
+    const auto path = found_path(*recording, 0, quality);
+    ASSERT_TRUE(path) << path.error().message;
+    const auto own = developed(nullptr), given = developed(&*path);
+    ASSERT_TRUE(own && given);
+    EXPECT_EQ(own->lamps, given->lamps);
+    EXPECT_EQ(own->confidence, given->confidence);
 }
 
 TEST_F(MotionRecording, limit_without_a_flow_is_the_error_of_the_frames_as_they_stand) {
     const auto recording = record(plan_, "");
     MotionPath path = true_path(*recording, 0);
     for (MotionKnot& knot : path) knot.flow = FlowField(knot.flow.width, knot.flow.height);
-    const AlignLimit limit = align_limit(*recording, path);
-    EXPECT_GT(limit.still_psnr_db, 0);
-    EXPECT_NEAR(limit.moved_psnr_db, limit.still_psnr_db, 1e-3);
+    const AlignLimit limit(*recording, path);
+    EXPECT_GT(limit.still_db(AlignLimit::Where::visible), 0);
+    EXPECT_NEAR(limit.moved_db(path, AlignLimit::Where::visible), limit.still_db(AlignLimit::Where::visible), 1e-3);
 }
 
 // Its rim stays: antialiased, it is interpolated.
@@ -180,8 +237,11 @@ TEST_F(MotionRecording, limit_of_a_ball_that_moves_sideways_is_above_no_alignmen
     text.replace(text.find("samples = 1"), 11, "samples = 16");
     std::ofstream(plan_.scene) << text;
     const auto recording = record(plan_, "");
-    const AlignLimit limit = align_limit(*recording, true_path(*recording, 0));
-    EXPECT_GT(limit.moved_psnr_db, limit.still_psnr_db + 3);
+    const MotionPath path = true_path(*recording, 0);
+    const AlignLimit limit(*recording, path);
+    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::visible), limit.still_db(AlignLimit::Where::visible) + 3);
+    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::inside), limit.moved_db(path, AlignLimit::Where::visible) + 3)
+        << "the rim is left out";
 }
 
 TEST_F(MotionRecording, of_a_scene_that_is_not_there_is_an_error_that_names_it) {
