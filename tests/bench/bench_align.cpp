@@ -31,11 +31,15 @@ Value sure(Result<Value> value) {
     std::exit(1);
 }
 
-std::unique_ptr<MotionDeveloper> developer(const Recording& recording, const std::string& quality) {
+constexpr const char* flow_only = "flow only";  // standard, whose samples do not follow the brightness
+
+std::unique_ptr<MotionDeveloper> developer(const Recording& recording, const std::string& name) {
     DevelopOptions options;
     options.threads = 1;
+    MotionQuality quality = *motion_quality(name == flow_only ? "standard" : name);
+    quality.follows_brightness = name != flow_only;
     return std::make_unique<MotionDeveloper>(recording.sequence, recording.calibration, recording.camera().noise,
-                                             options, *motion_quality(quality));
+                                             options, quality);
 }
 
 Target first_target(const Recording& recording, const std::string& quality, const MotionPath* path = nullptr) {
@@ -74,7 +78,7 @@ void measure(Bench& bench, const Line& line) {
 // The targets of one take by setting, each developed once. Empty where nothing is measured.
 using Targets = std::vector<std::pair<std::string, Target>>;
 
-constexpr const char* ways[] = {"none", "preview", "standard", "final", "true flow", "frozen"};
+constexpr const char* ways[] = {"none", flow_only, "preview", "standard", "final", "true flow", "frozen"};
 
 Targets develop_all(Takes& takes, const Take& take) {
     Targets targets;
@@ -86,7 +90,8 @@ Targets develop_all(Takes& takes, const Take& take) {
         else if (way == "frozen")
             targets.push_back({way, first_target(*take.frozen, "none")});
         else
-            targets.push_back({way, first_target(take.recording, way, sure(takes.found(take, way)))});
+            targets.push_back(
+                {way, first_target(take.recording, way, sure(takes.found(take, way == flow_only ? "standard" : way)))});
     }
     return targets;
 }
@@ -106,7 +111,8 @@ void measure_relit(Bench& bench, const std::string& name, const Take* take, cons
         .note =
             "**What is relit.** After each scene's name the subject's motion at 320 x 240: the mean and the most "
             "pixels "
-            "a cycle. Left to right: as recorded, the qualities, the scene's own geometry in place of a flow, and a "
+            "a cycle. Left to right: as recorded, `standard` without following the tracking frames' brightness "
+            "([motion.md](motion.md)), the qualities, the scene's own geometry in place of a flow, and a "
             "subject that stands still in the target's pose: noise alone, the most that there is to gain.",
         .figures = {}};
     measure_targets(bench, line, targets,
@@ -274,7 +280,8 @@ void measure_time(Bench& bench, const Take* take) {
 SheetBand sheet_band(const std::string& basis, const Take& take, const Targets& targets) {
     SheetBand band{basis, take.truth->relit_truth(1), {}};
     for (const auto& [way, target] : targets)
-        if (way != "preview") band.pictures.push_back({way, take.truth->relit(target, lightings()[1])});
+        if (way != "preview" && way != "true flow")
+            band.pictures.push_back({way, take.truth->relit(target, lightings()[1])});
     return band;
 }
 
