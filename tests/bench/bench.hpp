@@ -53,7 +53,7 @@ struct Knob {
     // alone (`error`, in its unit). Else empty.
     std::string table = "";
     std::string table_note = "";  // what that table shows, above it; the same for all its knobs
-    int most_rounds = 1000;  // for settings that take seconds; 1: the run that the error is of is timed
+    int most_rounds = 1000;       // for settings that take seconds; 1: the run that the error is of is timed
 };
 
 struct Subject {
