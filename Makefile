@@ -49,7 +49,7 @@ benchmarks: setup
 	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
 	@ninja -C $(HOST) --quiet benchmarks
 
-bench: benchmarks ## what accuracy costs (SUBJECT=name for one subject): out/bench, docs/accuracy.md
+bench: benchmarks assets ## what accuracy costs (SUBJECT=name for one subject): out/bench, docs/accuracy.md; renders moving scenes the first time
 	@$(PYTHON) tests/bench/bench.py $(if $(SUBJECT),--subject $(SUBJECT))
 
 bench-smoke: benchmarks ## every benchmark once at tiny sizes, and the tests of their page

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <optional>
 #include <type_traits>
 
 #include "parallel.hpp"
@@ -141,7 +142,8 @@ std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
 
 // A frame that saturates nowhere lacks no sample: what motion leads to outside it takes its edge.
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, std::span<Sum> out,
+void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay,
+                                        const FollowedBrightness* brightness, std::span<Sum> out,
                                         std::vector<uint8_t>& marks) const {
     const std::vector<Source>& sources = rows[row];
     std::vector<float> sums(sources.size() > 1 ? out.size() : 0), counts(sums.size());
@@ -154,6 +156,7 @@ void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, b
             for (size_t p = 0; p < out.size(); ++p) marks[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
             if (clipped_stay) warp.warp(source, source.planes->clipped, out.data());
         }
+        if (brightness) brightness->apply(source.place, out);
         if (masks_untrusted) {
             const float* trust = alignment->confidence(source.place.interval).data() + band.first_pixel();
             marks.resize(out.size());
@@ -174,10 +177,12 @@ RowBand<Sum> AlignedRows<Sample, Sum>::load(const Band& band, const Frame& like,
     loaded.rows.resize(rows.size());
     loaded.masked.assign(band.samples(), 0);
     set_black(loaded, band, like, black);
+    std::optional<FollowedBrightness> brightness;
+    if (tracking) brightness.emplace(tracking->load(band, like, black, false).rows, instant, noise);
     std::vector<std::vector<uint8_t>> marks(rows.size());
     for_each_index(threads, rows.size(), [&](size_t row) {
         loaded.rows[row].resize(band.samples());
-        load_row(row, band, like.cfa, clipped_stay, loaded.rows[row], marks[row]);
+        load_row(row, band, like.cfa, clipped_stay, brightness ? &*brightness : nullptr, loaded.rows[row], marks[row]);
     });
     for (const auto& some : marks)
         for (size_t p = 0; p < some.size(); ++p) loaded.masked[p] |= some[p];

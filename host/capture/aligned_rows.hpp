@@ -8,6 +8,7 @@
 
 #include "capture/align.hpp"
 #include "capture/color_planes.hpp"
+#include "capture/followed_brightness.hpp"
 #include "capture/row_band.hpp"
 
 namespace ols {
@@ -26,7 +27,11 @@ struct AlignedRows {
     // Whether samples of pixels that are not trusted are masked, for an estimate to fill in. Otherwise they stay as they
     // are: rows that lost a whole group of slots determine no lamp.
     bool masks_untrusted = false;
-    int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
+    // The tracking frames, a row for each knot of the alignment, whose brightness samples follow; null: they do not.
+    std::shared_ptr<const AlignedRows> tracking;
+    size_t instant = 0;  // the target's knot
+    NoiseModel noise;    // of the camera
+    int threads = 0;     // 0: as many as there are processors. Any number gives the same bits.
 
     // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` saturated samples count like others,
     // marked all the same.
@@ -39,8 +44,9 @@ struct AlignedRows {
 
   private:
     // `marks` stays empty where nothing is masked.
-    void load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, std::span<Sum> out,
-                  std::vector<uint8_t>& marks) const;
+    // `brightness` may be null.
+    void load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, const FollowedBrightness* brightness,
+                  std::span<Sum> out, std::vector<uint8_t>& marks) const;
 };
 
 }  // namespace ols

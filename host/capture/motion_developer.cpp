@@ -104,8 +104,32 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
 }
 
 template <typename Sample, typename Sum>
-AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
-                                                Ready<Sample>& ready) {
+void MotionDeveloper::follow_brightness(const TargetFrames& frames, const MotionPath& path,
+                                        const ColorPlanes<Sample>& black, AlignedRows<Sample, Sum>& aligned) const {
+    const auto frame_at = [&](const MotionKnot& knot) {
+        return std::ranges::find(frames.tracking, knot.tick, [](const auto& one) { return middle_tick(*one.frame); });
+    };
+    const auto instant = std::ranges::find_if(path, &MotionKnot::is_instant);
+    // Where the target's own tracking frame was lost, nothing tells its brightness.
+    if (!quality_.follows_brightness || path.size() == 1 || frame_at(*instant) == frames.tracking.end()) return;
+    auto tracking = std::make_shared<AlignedRows<Sample, Sum>>();
+    tracking->rows.resize(path.size());
+    tracking->alignment = aligned.alignment;
+    tracking->threads = options_.threads;
+    for_each_index(options_.threads, path.size(), [&](size_t k) {
+        const auto found = frame_at(path[k]);
+        if (found == frames.tracking.end()) return;
+        auto planes = std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*found->frame, black));
+        tracking->rows[k] = {{std::move(planes), aligned.alignment->place_of(path[k].tick)}};
+    });
+    aligned.tracking = std::move(tracking);
+    aligned.instant = size_t(instant - path.begin());
+    aligned.noise = noise_;
+}
+
+template <typename Sample, typename Sum>
+AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, const MotionPath& path,
+                                                std::shared_ptr<const Alignment> alignment, Ready<Sample>& ready) {
     const Stopwatch watch(times_.planes);
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
@@ -129,6 +153,7 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std:
             {planes[i], alignment->place_of(middle_tick(*frames.frames[i]))});
     }
     aligned.alignment = std::move(alignment);
+    follow_brightness(frames, path, *ready.black, aligned);
     return aligned;
 }
 
@@ -143,11 +168,11 @@ Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames, const M
     AlignedFrames aligned;
     aligned.like = frames.frames.front();
     if (fits_shorts(like.format, like.white, calibration_.black))
-        aligned.rows = align<int16_t, int16_t>(frames, alignment, ready_shorts_);
+        aligned.rows = align<int16_t, int16_t>(frames, path, alignment, ready_shorts_);
     else if (like.format == PixelFormat::u16)
-        aligned.rows = align<float, int32_t>(frames, alignment, ready_floats_);
+        aligned.rows = align<float, int32_t>(frames, path, alignment, ready_floats_);
     else
-        aligned.rows = align<float, float>(frames, alignment, ready_floats_);
+        aligned.rows = align<float, float>(frames, path, alignment, ready_floats_);
     return aligned;
 }
 

@@ -69,8 +69,11 @@ class MotionDeveloper {
 
     Result<MotionPath> find_path(const TargetFrames& frames);
     template <typename Sample, typename Sum>
-    AlignedRows<Sample, Sum> align(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment,
-                                   Ready<Sample>& ready);
+    AlignedRows<Sample, Sum> align(const TargetFrames& frames, const MotionPath& path,
+                                   std::shared_ptr<const Alignment> alignment, Ready<Sample>& ready);
+    template <typename Sample, typename Sum>
+    void follow_brightness(const TargetFrames& frames, const MotionPath& path, const ColorPlanes<Sample>& black,
+                           AlignedRows<Sample, Sum>& aligned) const;
     Result<AlignedFrames> align(const TargetFrames& frames, const MotionPath& path);
 
     const Sequence& sequence_;

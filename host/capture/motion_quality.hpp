@@ -17,6 +17,9 @@ struct MotionQuality {
     TrackingFlowOptions flow = {};
     // Runs of eight pixels whose vectors lie that near to a line are warped along it (warp.hpp).
     float line_tolerance_px = 0.02f;
+    // Whether samples follow the brightness of the tracking frames where alignment leaves it different
+    // (capture/followed_brightness.hpp).
+    bool follows_brightness = true;
     // The motion before and after a target that goes with it into the archive, for motion blur: a shutter of 360 degrees at 24
     // targets a second.
     double motion_reach_s = 1 / 48.0;

@@ -126,20 +126,27 @@ void Bench::measure(const Knob& knob) {
                     {"default", knob.default_setting},
                     {"why_off_front", knob.why_off_front},
                     {"differs_by_machine", knob.differs_by_machine},
+                    {"table", knob.table},
+                    {"table_note", knob.table_note},
                     {"settings", names}});
         return;
     }
 
     std::vector<double> errors;
     std::vector<std::optional<uint64_t>> bytes;
-    for (const auto& setting : knob.settings) {
-        bytes.push_back(peak_bytes_of(setting.run));
+    std::vector<std::vector<double>> times(count);
+    const int rounds = std::min(rounds_, knob.most_rounds);
+    for (size_t i = 0; i < count; ++i) {
+        const Setting& setting = knob.settings[i];
+        if (setting.prepare) setting.prepare();
+        bytes.push_back(peak_bytes_of([&] { times[i] = {time_of(setting)}; }));
         errors.push_back(setting.error());
     }
-    std::vector<std::vector<double>> times(count);
-    for (int round = 0; round < rounds_; ++round)
+    if (knob.most_rounds > 1) times.assign(count, {});
+    for (int round = 0; round < rounds && knob.most_rounds > 1; ++round)
         for (size_t k = 0; k < count; ++k) {
             const size_t i = (k + size_t(round)) % count;
+            if (knob.settings[i].prepare) knob.settings[i].prepare();
             times[i].push_back(time_of(knob.settings[i]));
         }
     const auto timings = compare_times(times, peer);
@@ -156,7 +163,7 @@ void Bench::measure(const Knob& knob) {
                     {"ms_median", timings[i].ms_median},
                     {"ratio_to_peer", timings[i].ratio_to_peer},
                     {"threads", setting.threads},
-                    {"rounds", rounds_},
+                    {"rounds", rounds},
                     {"bytes", bytes[i] ? Json(*bytes[i]) : Json()}});
     }
 }

@@ -32,9 +32,10 @@ namespace ols {
 
 struct Setting {
     std::string name;
-    std::function<void()> run;      // the work that is timed, whole each time; its result stays for `error`
-    std::function<double()> error;  // of the latest run against truth, in the knob's unit; exact is 0
-    int threads = 1;                // that `run` uses
+    std::function<void()> run;           // the work that is timed, whole each time; its result stays for `error`
+    std::function<double()> error;       // of the latest run against truth, in the knob's unit; exact is 0
+    int threads = 1;                     // that `run` uses
+    std::function<void()> prepare = {};  // before each run, not timed; may be none
 };
 
 struct Knob {
@@ -48,6 +49,11 @@ struct Knob {
     std::string why_off_front = "";
     std::vector<Setting> settings;
     bool differs_by_machine = false;  // settings and default are those of the processor at hand
+    // Where many knobs have the same settings: the table of the docs that shows all of them, each in a line, by their figure
+    // alone (`error`, in its unit). Else empty.
+    std::string table = "";
+    std::string table_note = "";  // what that table shows, above it; the same for all its knobs
+    int most_rounds = 1000;       // for settings that take seconds; 1: the run that the error is of is timed
 };
 
 struct Subject {
@@ -75,6 +81,9 @@ class Bench {
 
     // Whether sizes should be those that the docs state; else tiny.
     bool full() const { return mode_ == Mode::full; }
+
+    // Whether anything is measured; else the registry is listed, and inputs are not needed.
+    bool measures() const { return mode_ != Mode::list; }
 
     // Prints the knob's registry entry, or measures: first each setting once, for its error and its memory, then rounds
     // in each of which every setting runs once, every round beginning with another one, so that a disturbance of the

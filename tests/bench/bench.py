@@ -3,7 +3,7 @@
 """Measures what accuracy costs: runs the benchmark programs, keeps their rows in out/bench/<subject>.json, and writes
 docs/accuracy.md with its plot when every subject has been measured.
 
-    bench.py                        all subjects
+    bench.py                        all subjects; `align` renders its scenes into out/bench/motion the first time, for minutes
     bench.py --subject inversion    one; the others' rows stay as they are
     bench.py --smoke                every program at tiny sizes; writes nothing
     bench.py --docs                 measures nothing; writes the page from the rows there are

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """docs/accuracy.md: made of the registry of knobs and of what `make bench` measured, by nothing else."""
+import math
+
 import pareto
 
 HEAD = """# What accuracy costs
@@ -38,6 +40,39 @@ def rows_of(knob, rows):
     return [row for row in rows if row["knob"] == knob["knob"]]
 
 
+PSNR_UNIT = "% of peak rms"
+
+
+def figure_text(row):
+    """A figure for a table of many knobs: without its unit, an rms error in percent of a peak as PSNR."""
+    if row["error"] is None:
+        return "not finite"
+    if row["error_unit"] == PSNR_UNIT:
+        return f"{-20 * math.log10(row['error'] / 100):.1f}" if row["error"] > 0 else "exact"
+    return significant(row["error"], 3)
+
+
+def tables_of(knobs):
+    """{title: knobs} of the tables that hold many knobs, in the order of their first ones."""
+    tables = {}
+    for knob in knobs:
+        if knob["table"]:
+            tables.setdefault(knob["table"], []).append(knob)
+    return tables
+
+
+def table(title, knobs, rows):
+    """A line a knob, a column a setting."""
+    default, settings = knobs[0]["default"], knobs[0]["settings"]
+    head = [f"**{setting}**" if setting == default else setting for setting in settings]
+    note = knobs[0]["table_note"]
+    text = (f"\n{note}\n" if note else "") + f"\n| {title} | " + " | ".join(head) + " |\n| --- |" + " --- |" * len(head) + "\n"
+    for knob in knobs:
+        by_setting = {row["setting"]: row for row in rows_of(knob, rows)}
+        text += f"| {knob['knob']} | " + " | ".join(figure_text(by_setting[setting]) for setting in settings) + " |\n"
+    return text
+
+
 def table_line(row, is_first, on_front):
     name = f"**{row['setting']}**" if row["default"] else row["setting"]
     error = "not finite" if row["error"] is None else "0" if row["error"] == 0 else f"{significant(row['error'], 2)} {row['error_unit']}"
@@ -62,16 +97,19 @@ def knob_sentence(knob, rows):
 def unexplained(subject, knobs, rows):
     """Knobs whose default is off the front, without a reason in the registry."""
     return [f"{subject['subject']}, {knob['knob']}: the default '{knob['default']}' is not on the Pareto front, and why_off_front is empty"
-            for knob in knobs if not default_on_front(knob, rows) and not knob["why_off_front"]]
+            for knob in knobs if not knob["table"] and not default_on_front(knob, rows) and not knob["why_off_front"]]
 
 
 def section(subject, knobs, rows):
-    text = f"\n## {subject['subject'].capitalize()}\n\n{subject['truth']}\n\n{subject['advice']}\n\n" + COLUMNS
-    for knob in knobs:
+    text = f"\n## {subject['subject'].capitalize()}\n\n{subject['truth']}\n\n{subject['advice']}\n\n"
+    alone = [knob for knob in knobs if not knob["table"]]
+    text += COLUMNS if alone else ""
+    for knob in alone:
         own = rows_of(knob, rows)
         on_front = [row["setting"] for row in pareto.front(own)]
         text += "".join(table_line(row, i == 0, row["setting"] in on_front) for i, row in enumerate(own))
-    return text + "\n" + "".join(knob_sentence(knob, rows) for knob in knobs)
+    text += "\n" + "".join(knob_sentence(knob, rows) for knob in alone)
+    return text + "".join(table(title, of_table, rows) for title, of_table in tables_of(knobs).items())
 
 
 def page(registry, results, machine):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The plot of docs/accuracy.md: a panel for each knob."""
+import functools
 import math
 
 import matplotlib
@@ -59,6 +60,20 @@ def draw_panel(axes, title, rows):
         axes.annotate(", ".join(map(str, numbers)), places[numbers[0]], xytext=(-8, 7), textcoords="offset points", ha="right", fontsize=8)
 
 
+def draw_table_panel(axes, title, knobs, rows):
+    """Figures of many knobs with the same settings: a place a knob, a mark a setting."""
+    for number, setting in enumerate(knobs[0]["settings"]):
+        heights = [next(row["error"] for row in page.rows_of(knob, rows) if row["setting"] == setting) for knob in knobs]
+        axes.plot(range(len(knobs)), heights, "osv^D"[number % 5], markersize=5, label=setting, linestyle="none")
+    axes.set_title(title, fontsize=10, loc="left")
+    axes.set_yscale("log")
+    axes.set_ylabel(f"figure, {page.rows_of(knobs[0], rows)[0]['error_unit']}", fontsize=8)
+    axes.set_xticks(range(len(knobs)), [knob["knob"] for knob in knobs], rotation=90, fontsize=6)
+    axes.tick_params(axis="y", labelsize=8)
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.01, 1.02), handlelength=1, frameon=False, borderaxespad=0)
+
+
 def frame_panel(axes, title, rows, floor):
     axes.set_title(title, fontsize=10, loc="left")
     axes.set_xscale("log")
@@ -83,12 +98,22 @@ def frame_panel(axes, title, rows, floor):
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.01, 1.02), handlelength=1, frameon=False, borderaxespad=0)
 
 
+def panels_of(subject, knobs, rows):
+    """A function of the axes for each panel: one a knob, one for each table of knobs whose figures share a unit."""
+    for knob in knobs:
+        if not knob["table"]:
+            yield functools.partial(draw_panel, title=f"{subject['subject']}: {knob['knob']}", rows=page.rows_of(knob, rows))
+    for title, of_table in page.tables_of(knobs).items():
+        if len({page.rows_of(knob, rows)[0]["error_unit"] for knob in of_table}) == 1:
+            yield functools.partial(draw_table_panel, title=f"{subject['subject']}: {title}", knobs=of_table, rows=rows)
+
+
 def draw(registry, results, path):
-    panels = [(f"{subject['subject']}: {knob['knob']}", page.rows_of(knob, results[subject["subject"]])) for subject, knobs in registry for knob in knobs]
+    panels = [panel for subject, knobs in registry for panel in panels_of(subject, knobs, results[subject["subject"]])]
     lines = math.ceil(len(panels) / COLUMNS)
     figure, grid = pyplot.subplots(lines, COLUMNS, figsize=(13, 3.1 * lines), squeeze=False, layout="constrained")
-    for axes, panel in zip(grid.flat, panels):
-        draw_panel(axes, *panel)
+    for axes, draw_on in zip(grid.flat, panels):
+        draw_on(axes)
     for axes in list(grid.flat)[len(panels):]:
         axes.set_visible(False)
     figure.savefig(path, dpi=110, metadata={"Software": None})

@@ -10,7 +10,7 @@ import pytest
 
 SUBJECT = {"subject": "inversion", "truth": "Exact sums.", "advice": "Take the default."}
 KNOB = {"subject": "inversion", "knob": "method", "set_by": "`--method`", "error_unit": "counts", "peer": "plain", "default": "fast",
-        "why_off_front": "", "differs_by_machine": False, "settings": ["plain", "fast"]}
+        "why_off_front": "", "differs_by_machine": False, "table": "", "table_note": "", "settings": ["plain", "fast"]}
 
 
 def row(setting, ms, error, **other):
@@ -63,6 +63,17 @@ def test_a_knob_that_the_page_lacks_and_a_changed_default_are_found():
     assert "'plain'" in page.missing([(SUBJECT, [{**KNOB, "default": "plain"}])], text)[0]
     assert page.missing([(SUBJECT, [{**KNOB, "default": "avx512", "differs_by_machine": True}])], text) == []
     assert "'method' of masks" in page.missing([({**SUBJECT, "subject": "masks"}, [KNOB])], text)[0]
+
+
+def test_knobs_of_one_table_are_lines_of_it_and_an_error_relative_to_a_peak_is_a_psnr():
+    knobs = [{**KNOB, "knob": name, "table": "dB", "table_note": "How near."} for name in ("turning", "still")]
+    rows = [{**row("plain", 1, 10.0), "knob": "turning"}, {**row("fast", 2, 1.0), "knob": "turning"},
+            {**row("plain", 1, 0.0), "knob": "still"}, {**row("fast", 2, None), "knob": "still"}]
+    rows = [{**one, "error_unit": page.PSNR_UNIT} for one in rows]
+    text = page.page([(SUBJECT, knobs)], {"inversion": rows}, "a machine")
+    assert "\nHow near.\n\n| dB | plain | **fast** |\n| --- | --- | --- |\n| turning | 20.0 | 40.0 |\n| still | exact | not finite |\n" in text
+    assert page.missing([(SUBJECT, knobs)], text) == []
+    assert page.unexplained(SUBJECT, knobs, rows) == []
 
 
 @pytest.mark.parametrize("value, text", [(0, "0"), (172.6, "173"), (12345.6, "12346"), (0.02514, "0.0251"), (1.234e-7, "1.23e-07")])

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "board_messages.hpp"
@@ -36,6 +37,12 @@ size_t first_triggered(const Sequence& sequence, const CameraConfig& camera) {
     return slot;
 }
 
+// How many slots of a cycle trigger the camera before slot `end`.
+uint64_t triggers_before(const Sequence& sequence, const CameraConfig& camera, size_t end) {
+    return uint64_t(std::count_if(sequence.slots.begin(), sequence.slots.begin() + std::ptrdiff_t(end),
+                                  [&](const Slot& slot) { return triggers(slot, camera); }));
+}
+
 // Light and trigger last equally long, one offset against the other: only where they overlap counts.
 std::vector<double> lit_microseconds(const Slot& slot) {
     const int64_t lit_ticks =
@@ -53,28 +60,34 @@ double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32
     return middle * microseconds_per_tick;
 }
 
+Result<std::shared_ptr<const Frame>> render_slot(Renderer& renderer, const Setup& setup, const Sequence& sequence,
+                                                 uint32_t cycle, size_t number, std::optional<double> frozen_us) {
+    const Slot& slot = sequence.slots[number];
+    if (!triggers(slot, setup.camera)) return std::shared_ptr<const Frame>();
+    if (slot.planes > 0)
+        return fail(
+            fmt::format("slot {} has grey levels, which only the board lays out in time: use stagesim run", number));
+    const uint64_t trigger = cycle * triggers_before(sequence, setup.camera, sequence.slots.size()) +
+                             triggers_before(sequence, setup.camera, number);
+    const double time_us = frozen_us ? *frozen_us : slot_time_us(sequence, setup.camera, cycle, number);
+    const Exposure exposure = renderer.expose(lit_microseconds(slot), time_us, trigger, 0);
+    auto frame = std::make_shared<Frame>(make_frame(exposure, setup.camera, renderer.effects()));
+    frame->identified = true;
+    frame->cycle = cycle, frame->slot = uint32_t(number);
+    frame->tick =
+        uint64_t(rise_tick(sequence, cycle, number) - rise_tick(sequence, 0, first_triggered(sequence, setup.camera)));
+    frame->exposure_ticks = slot.exposure_ticks;
+    frame->stamp = {trigger + 1, camera_time_ns(setup.scene.clock, frame->tick)};
+    return std::shared_ptr<const Frame>(std::move(frame));
+}
+
 Result<std::vector<std::shared_ptr<const Frame>>> render_slots(Renderer& renderer, const Setup& setup,
                                                                const Sequence& sequence, uint32_t cycle) {
-    std::vector<std::shared_ptr<const Frame>> frames(sequence.slots.size());
-    uint64_t in_a_cycle = 0;
-    for (const Slot& slot : sequence.slots) in_a_cycle += triggers(slot, setup.camera);
-    uint64_t trigger = cycle * in_a_cycle;
-    for (size_t s = 0; s < frames.size(); ++s) {
-        const Slot& slot = sequence.slots[s];
-        if (!triggers(slot, setup.camera)) continue;
-        if (slot.planes > 0)
-            return fail(
-                fmt::format("slot {} has grey levels, which only the board lays out in time: use stagesim run", s));
-        const Exposure exposure =
-            renderer.expose(lit_microseconds(slot), slot_time_us(sequence, setup.camera, cycle, s), trigger++, 0);
-        auto frame = std::make_shared<Frame>(make_frame(exposure, setup.camera, renderer.effects()));
-        frame->identified = true;
-        frame->cycle = cycle, frame->slot = uint32_t(s);
-        frame->tick =
-            uint64_t(rise_tick(sequence, cycle, s) - rise_tick(sequence, 0, first_triggered(sequence, setup.camera)));
-        frame->exposure_ticks = slot.exposure_ticks;
-        frame->stamp = {trigger, camera_time_ns(setup.scene.clock, frame->tick)};
-        frames[s] = std::move(frame);
+    std::vector<std::shared_ptr<const Frame>> frames;
+    for (size_t slot = 0; slot < sequence.slots.size(); ++slot) {
+        auto frame = render_slot(renderer, setup, sequence, cycle, slot);
+        if (!frame) return frame.error();
+        frames.push_back(std::move(*frame));
     }
     return frames;
 }

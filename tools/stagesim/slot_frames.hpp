@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "renderer.hpp"
@@ -14,6 +15,11 @@ namespace ols {
 // Scene time of the middle of a slot's exposure: time 0 is the first trigger that this camera gets. Frozen at this
 // moment, `Renderer::light` gives the truth of what is made of that slot.
 double slot_time_us(const Sequence& sequence, const CameraConfig& camera, uint32_t cycle, size_t slot);
+
+// The frame that the camera delivers of a slot: one of render_slots(), rendered alone. Null where the camera is not triggered.
+// With `frozen_us` the scene stands as it does at that time.
+Result<std::shared_ptr<const Frame>> render_slot(Renderer& renderer, const Setup& setup, const Sequence& sequence,
+                                                 uint32_t cycle, size_t slot, std::optional<double> frozen_us = {});
 
 // The frames that the camera delivers of a cycle, by slot, each identified and with the noise of its place in the take;
 // null where the camera is not triggered. Frames are the same, to the bit, as those of VirtualCamera, and do not depend
