@@ -109,7 +109,7 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, std:
     const Stopwatch watch(times_.planes);
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
-    aligned.masks_untrusted = options_.estimate != Estimate::none;
+    aligned.masks_untrusted = has_prior(options_.estimate);
     aligned.threads = options_.threads;
     const Frame& like = *frames.frames.front();
     if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);

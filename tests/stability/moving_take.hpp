@@ -49,12 +49,13 @@ struct Offset {
     double x = 0, y = 0;
 };
 
-// A flat, matte sheet: lamp i gives it albedo * max(0, normal . direction_i).
+// A flat sheet: lamp i gives it albedo * max(0, normal . direction_i), and where it shines albedo * shine(i) besides.
 struct Layer {
     Albedo albedo;
     double radius = INFINITY;                   // of a disc about its centre, pixels; edges blended over a pixel
     std::function<Offset(double)> offset = {};  // of the centre from the image's, after so many slots; none: it stays
     Vec3 normal = {0, 0, 1};
+    std::function<double(int)> shine = {};
 };
 
 struct Scene {
@@ -176,7 +177,8 @@ class Take {
     }
 
     double lobe(size_t layer, int lamp) const {
-        return std::max(0.0, dot(scene_.layers[layer].normal, lamps_[size_t(lamp)].direction));
+        const Layer& sheet = scene_.layers[layer];
+        return std::max(0.0, dot(sheet.normal, lamps_[size_t(lamp)].direction)) + (sheet.shine ? sheet.shine(lamp) : 0);
     }
 
     const std::vector<Image>& layers(double time) {
