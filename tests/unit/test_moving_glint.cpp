@@ -61,9 +61,10 @@ TEST(MovingGlint, has_no_hole_where_clipped_samples_count) {
         EXPECT_LT(target.lamps[glint_lamp][p], level);
         EXPECT_GT(target.lamps[glint_lamp][p], 0.9 * level);
     }
-    for (size_t p = 0; p < target.mask.size(); ++p)
-        if (!(target.mask[p] & mask_estimated))
-            for (size_t i = 0; i < target.lamps.size(); ++i) ASSERT_EQ(target.lamps[i][p], without.lamps[i][p]);
+    for (size_t p = 0; p < target.mask.size(); ++p) {
+        if (target.mask[p] & mask_estimated) continue;
+        for (size_t i = 0; i < target.lamps.size(); ++i) ASSERT_EQ(target.lamps[i][p], without.lamps[i][p]);
+    }
 }
 
 // Without motion the counts of a still camera are clipped where they are: interpolation adds nothing to that.
