@@ -73,6 +73,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
               {"flow", report.seconds_motion.flow},
               {"planes", report.seconds_motion.planes},
               {"invert", report.seconds_motion.invert},
+              {"matte", report.seconds_motion.matte},
               {"write", report.seconds_write}}}};
 }
 
