@@ -9,6 +9,7 @@
 //                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known),
 //                                      "noise_gain" (Y, FLOAT; left out when no sample was filled in),
 //                                      "confidence" (Y, FLOAT; left out when nothing was aligned),
+//                                      "matte" (Y or R G B, and variance, FLOAT; left out where there is none),
 //                                      "motion" (instant_000.u .v ..., HALF; left out when not known)
 //
 // A target counts only when its journal line is complete and its file agrees with it. A target's file gets its name
@@ -24,6 +25,7 @@
 
 #include "image/frame.hpp"
 #include "image/plane.hpp"
+#include "image/target_matte.hpp"
 #include "image/target_motion.hpp"
 #include "result.hpp"
 #include "stage/lamps.hpp"
@@ -56,6 +58,7 @@ struct Target {
     // [y * width + x]: how well the flow that aligned this pixel's samples leads back to where it came from, 0 to 1, the
     // least of all (reflectance/flow.hpp, confidence()). Empty if nothing was aligned.
     std::vector<float> confidence;
+    TargetMatte matte;  // of a performance whose sequence has matte slots; of a head that was read, all but its samples
     std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0
     nlohmann::json provenance;       // cycle, tick, timecode, slots used: goes to the header and the journal
     TargetMotion motion;             // empty if not known; a target that was read has the times only: read_motion()
@@ -101,7 +104,8 @@ class ArchiveWriter {
     // Writes a target to a temporary name, fsyncs, renames, then journals it; for one thread at a time. After an error
     // (a full disk, say) neither file nor journal line stays, what was written before is untouched, and the writer may
     // be used on. Values that the sample type cannot hold are clamped and masked (mask_clamped), never Inf or NaN. Motion is
-    // stored as half floats, an error of at most 1/2048 of a vector; one that check_motion() refuses is an error.
+    // stored as half floats, an error of at most 1/2048 of a vector; one that check_motion() refuses is an error, and so is a
+    // matte of another size than the target's or with values that are not finite.
     Status write_target(const Target& target);
 
     // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.

@@ -22,6 +22,7 @@
 
 #include "archive/exr_stream.hpp"
 #include "archive/manifest.hpp"
+#include "archive/matte_part.hpp"
 #include "archive/motion_part.hpp"
 
 namespace ols {
@@ -116,6 +117,12 @@ Imf::Header motion_header(const TakeInfo& info, const Target& head) {
     return header;
 }
 
+Imf::Header matte_header(const TakeInfo& info, const Target& head) {
+    Imf::Header header = data_header(info, head, "matte");
+    add_matte_channels(header, head.matte);
+    return header;
+}
+
 Imf::Header plane_header(const TakeInfo& info, const Target& head, const char* name, Imf::PixelType type) {
     Imf::Header header = data_header(info, head, name);
     header.channels().insert("Y", Imf::Channel(type));
@@ -171,6 +178,7 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
     if (!head.variance.empty()) headers.push_back(plane_header(info, head, "variance", Imf::FLOAT));
     if (!head.noise_gain.empty()) headers.push_back(plane_header(info, head, "noise_gain", Imf::FLOAT));
     if (!head.confidence.empty()) headers.push_back(plane_header(info, head, "confidence", Imf::FLOAT));
+    if (head.matte.frames > 0) headers.push_back(matte_header(info, head));
     if (!head.motion.flows.empty()) headers.push_back(motion_header(info, head));
     std::vector<uint32_t> mask = head.mask;
     mask.resize(size_t(head.width) * head.height);
@@ -185,6 +193,7 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
     int part = 2;
     for (const auto* plane : {&head.variance, &head.noise_gain, &head.confidence})
         if (!plane->empty()) write_plane(Imf::TiledOutputPart(file, part++), Imf::FLOAT, plane->data(), head);
+    if (head.matte.frames > 0) write_matte_tiles(Imf::TiledOutputPart(file, part++), head.matte);
     if (!head.motion.flows.empty()) write_motion_tiles(Imf::TiledOutputPart(file, part), head.motion);
     return Done{};
 }
@@ -198,6 +207,7 @@ std::string target_file_name(uint32_t camera, uint32_t index) {
 Status write_target_file(const std::string& path, const TakeInfo& info, const Target& head, const PlaneSource& source) {
     if (auto s = check_motion(head.motion, head.width, head.height); !s) return s;
     if (auto s = check_motion_range(head.motion); !s) return s;
+    if (auto s = check_matte(head.matte, head.planes(), size_t(head.width) * size_t(head.height)); !s) return s;
     ExrStream stream(path);
     Status written = Done{};
     try {
@@ -242,7 +252,7 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
     if (window.min != Imath::V2i(0, 0)) return fail("'" + path + "' has a data window that does not begin at 0, 0");
     target.width = window.max.x + 1;
     target.height = window.max.y + 1;
-    for (const char* name : {"mask", "variance", "noise_gain", "confidence", "motion"})
+    for (const char* name : {"mask", "variance", "noise_gain", "confidence", "matte", "motion"})
         if (const int p = find_part(file, name); p >= 0 && file.header(p).dataWindow() != window)
             return fail("'" + path + "' has parts of different sizes");
     target.provenance = nlohmann::json::parse(string_attribute(header, "provenance"), nullptr, false);
@@ -254,6 +264,11 @@ Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& p
         const auto times_s = motion_times(file.header(p));
         if (!times_s) return fail("'" + path + "': " + times_s.error().message);
         target.motion.times_s = *times_s;
+    }
+    if (const int p = find_part(file, "matte"); p >= 0) {
+        auto matte = matte_head(file.header(p), target.planes());
+        if (!matte) return fail("'" + path + "': " + matte.error().message);
+        target.matte = std::move(*matte);
     }
     return target;
 }
@@ -297,6 +312,14 @@ void read_plane(Imf::MultiPartInputFile& file, const char* name, Imf::PixelType 
     crop(plane, tiles, box);
 }
 
+void read_matte(Imf::MultiPartInputFile& file, TargetMatte& matte, const Box& tiles, const Box& box) {
+    if (matte.frames == 0) return;
+    const Imf::Header& header = file.header(find_part(file, "matte"));
+    read_part(file, "matte", matte_buffer(matte, header, tiles.x, tiles.y, tiles.width, tiles.height), tiles);
+    for (auto& plane : matte.planes) crop(plane, tiles, box);
+    if (!matte.variance.empty()) crop(matte.variance, tiles, box);
+}
+
 }  // namespace
 
 Result<Target> read_target_head(const std::string& path, const TakeInfo& info) {
@@ -330,6 +353,7 @@ Result<Target> read_target_box(const std::string& path, const TakeInfo& info, Bo
         read_plane(file, "variance", Imf::FLOAT, target.variance, tiles, box);
         read_plane(file, "noise_gain", Imf::FLOAT, target.noise_gain, tiles, box);
         read_plane(file, "confidence", Imf::FLOAT, target.confidence, tiles, box);
+        read_matte(file, target.matte, tiles, box);
         target.width = box.width;
         target.height = box.height;
         return head;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A target as an OpenEXR file of its parts: lamps, mask, variance, noise gain, motion.
+// A target as an OpenEXR file of its parts: lamps, mask, variance, noise gain, confidence, matte, motion.
 #pragma once
 
 #include <string>

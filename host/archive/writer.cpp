@@ -123,6 +123,7 @@ Status ArchiveWriter::write_target(const Target& target) {
     head.variance = target.variance;
     head.noise_gain = target.noise_gain;
     head.confidence = target.confidence;
+    head.matte = target.matte;
     head.missing_lamps = target.missing_lamps;
     head.provenance = target.provenance;
     head.motion = target.motion;

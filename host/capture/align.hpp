@@ -17,6 +17,11 @@ namespace ols {
 // and pass unchanged. |samples| < 2^31.
 void align_samples(std::span<const float> samples, std::span<int32_t> aligned);
 
+// The middle of an exposure: what motion in a frame is a mean about.
+inline double middle_tick(const Frame& frame) {
+    return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
+}
+
 // A pixel whose confidence (flow.hpp) is less has a flow that misses by more than is allowed.
 constexpr float trusted_confidence = 0.5f;
 

@@ -48,7 +48,7 @@ std::vector<int> missing_basis_slots(const CycleFrames& frames, const Sequence& 
 Developer::Developer(const Sequence& sequence, const CameraCalibration& calibration, const NoiseModel& noise,
                      DevelopOptions options)
     : sequence_(sequence), calibration_(calibration), noise_(noise), options_(std::move(options)) {
-    assert(options_.estimate == Estimate::none || int(options_.lamps.size()) == sequence.basis.lamps);
+    assert(!has_prior(options_.estimate) || int(options_.lamps.size()) == sequence.basis.lamps);
 }
 
 Developer::~Developer() = default;
@@ -56,8 +56,7 @@ Developer::~Developer() = default;
 FillCache& Developer::fills() {
     if (!fills_) {
         model_ = fill_model(sequence_.basis);
-        if (options_.estimate != Estimate::none)
-            add_smooth_prior(model_, image_lights(sequence_.basis, options_.lamps));
+        if (has_prior(options_.estimate)) add_smooth_prior(model_, image_lights(sequence_.basis, options_.lamps));
         fills_ = std::make_unique<FillCache>(model_, options_.estimate);
     }
     return *fills_;
@@ -67,7 +66,7 @@ template <typename Rows>
 Result<Target> Developer::invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots) {
     const std::vector<int> lost = empty_rows(rows.rows);
     const Basis& basis = sequence_.basis;
-    const bool stand_alone = options_.estimate == Estimate::none && is_one_image_a_row(basis);
+    const bool stand_alone = !has_prior(options_.estimate) && is_one_image_a_row(basis);
     if (!lost.empty() && !stand_alone && fills().fill_for(lost)->kind == FillKind::unsolved)
         return fail(
             fmt::format("every lamp of basis {} rests on all rows, slots {} are missing, and the other rows do not "

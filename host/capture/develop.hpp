@@ -47,7 +47,8 @@ struct AlignedFrames {
 // of the neighbouring cycles' frames of the same slots; where none of these is there either, the sample is masked, and
 // filled with what the other rows, and if asked for the prior, say of it (reflectance/fill_model.hpp). The target's mask
 // and noise gain tell which pixels that was, its provenance ("masked") how many and how far they may be off. A pixel that
-// is not solved is 0 under every lamp. With a basis that gives each row an image of its own, and no estimate, a lost slot is
+// is not solved is 0 under every lamp, or with Estimate::clipped inverted with what its saturated samples read. With a
+// basis that gives each row an image of its own, and no prior, a lost slot is
 // a missing lamp, and a saturated sample stands as it is, a lower bound.
 class Developer {
   public:

@@ -47,6 +47,8 @@ TargetFrames FrameStore::around(uint32_t index, uint64_t target) const {
         else
             frames.lost_tracking.push_back(number);
     }
+    for (const uint64_t number : nearest_matte_frames(sequence_, target, [this](uint64_t one) { return has(one); }))
+        frames.matte.push_back({number, find(number)});
     return frames;
 }
 

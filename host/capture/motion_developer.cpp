@@ -24,9 +24,11 @@ class Stopwatch {
     const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// The middle of an exposure: what motion in a frame is a mean about.
-double middle_tick(const Frame& frame) {
-    return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
+// In which nothing moves and nothing is trusted.
+MotionPath still_path(double tick, int width, int height) {
+    MotionKnot alone{tick, FlowField(width, height), {}, true};
+    alone.confidence.assign(alone.flow.size(), 0.0f);
+    return {std::move(alone)};
 }
 
 // The flows to the knots from the last before -reach to the first after reach, for motion blur.
@@ -90,15 +92,13 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
         last_tracking_ = fresh[i]->number;
     }
     double from = middle_tick(*frames.frames.front()), to = from;
-    for (const auto& frame : frames.frames) {
-        from = std::min(from, middle_tick(*frame));
-        to = std::max(to, middle_tick(*frame));
-    }
-    if (frames.tracking.empty()) {
-        MotionKnot alone{from, FlowField(int(frames.frames[0]->width), int(frames.frames[0]->height)), {}, true};
-        alone.confidence.assign(alone.flow.size(), 0.0f);
-        return MotionPath{std::move(alone)};
-    }
+    const auto reach = [&](const Frame& frame) {
+        from = std::min(from, middle_tick(frame));
+        to = std::max(to, middle_tick(frame));
+    };
+    for (const auto& frame : frames.frames) reach(*frame);
+    for (const MatteFrame& one : frames.matte) reach(*one.frame);
+    if (frames.tracking.empty()) return still_path(from, int(frames.frames[0]->width), int(frames.frames[0]->height));
     flows_.forget_before(from);
     return flows_.path(instant_of(frames, sequence_), from, to);
 }
@@ -133,7 +133,7 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, cons
     const Stopwatch watch(times_.planes);
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
-    aligned.masks_untrusted = options_.estimate != Estimate::none;
+    aligned.masks_untrusted = has_prior(options_.estimate);
     aligned.threads = options_.threads;
     const Frame& like = *frames.frames.front();
     if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
@@ -176,14 +176,30 @@ Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames, const M
     return aligned;
 }
 
+TargetMatte MotionDeveloper::matte_of(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment) {
+    if (frames.matte.empty()) return {};
+    const Stopwatch watch(times_.matte);
+    const Frame& like = *frames.matte.front().frame;
+    const int width = int(like.width), height = int(like.height);
+    if (!alignment)
+        alignment = std::make_shared<Alignment>(still_path(double(like.tick), width, height), width, height, like.cfa,
+                                                quality_.line_tolerance_px, options_.threads);
+    const std::vector<double> weights = matte_weights(frames.matte, frames.basis.target, sequence_);
+    return mean_matte({frames.matte, weights, std::move(alignment), calibration_, noise_, options_.threads});
+}
+
 Result<Target> MotionDeveloper::develop(const TargetFrames& frames, const MotionPath* path) {
     if (frames.frames.empty()) return fail("every basis slot around the target is missing");
     if (!quality_.compensates) {
         RowFrames rows(size_t(sequence_.basis.rows));
         for (size_t i = 0; i < frames.frames.size(); ++i)
             rows[size_t(sequence_.slots[size_t(frames.basis.choices[i].slot)].row)].push_back(frames.frames[i]);
-        const Stopwatch watch(times_.invert);
-        return developer_.develop(rows, frames.basis.lost);
+        auto target = [&] {
+            const Stopwatch watch(times_.invert);
+            return developer_.develop(rows, frames.basis.lost);
+        }();
+        if (target.ok()) target->matte = matte_of(frames, nullptr);
+        return target;
     }
     std::optional<MotionPath> found;
     if (!path) {
@@ -193,9 +209,13 @@ Result<Target> MotionDeveloper::develop(const TargetFrames& frames, const Motion
     }
     auto aligned = align(frames, path ? *path : *found);
     if (!aligned.ok()) return aligned.error();
-    const Stopwatch watch(times_.invert);
-    auto target = developer_.develop(*aligned, frames.basis.lost);
-    if (target.ok()) target->motion = motion_around(path ? *path : *found, quality_.motion_reach_s, *target);
+    auto target = [&] {
+        const Stopwatch watch(times_.invert);
+        return developer_.develop(*aligned, frames.basis.lost);
+    }();
+    if (!target.ok()) return target;
+    target->motion = motion_around(path ? *path : *found, quality_.motion_reach_s, *target);
+    target->matte = matte_of(frames, std::visit([](const auto& rows) { return rows.alignment; }, aligned->rows));
     return target;
 }
 

@@ -9,6 +9,7 @@
 
 #include "capture/develop.hpp"
 #include "capture/lazy_basis.hpp"
+#include "capture/matte_frames.hpp"
 #include "capture/motion_quality.hpp"
 
 namespace ols {
@@ -25,6 +26,7 @@ struct TargetFrames {
     };
     std::vector<Tracking> tracking;
     std::vector<uint64_t> lost_tracking;  // numbers
+    std::vector<MatteFrame> matte;        // nearest_matte_frames()
 };
 
 // Takes targets in their order. Every tracking frame's flow to its neighbours is found once, every basis frame made ready
@@ -46,6 +48,7 @@ class MotionDeveloper {
         double flow = 0;    // tracking images, flow, confidence
         double planes = 0;  // from frames to planes above black
         double invert = 0;  // warp, inversion, variance
+        double matte = 0;   // its frames' planes, warp, mean
     };
     const Times& times() const { return times_; }
 
@@ -75,6 +78,8 @@ class MotionDeveloper {
     void follow_brightness(const TargetFrames& frames, const MotionPath& path, const ColorPlanes<Sample>& black,
                            AlignedRows<Sample, Sum>& aligned) const;
     Result<AlignedFrames> align(const TargetFrames& frames, const MotionPath& path);
+    // Empty where the target has no matte frames; unwarped without an alignment.
+    TargetMatte matte_of(const TargetFrames& frames, std::shared_ptr<const Alignment> alignment);
 
     const Sequence& sequence_;
     const CameraCalibration& calibration_;

@@ -66,6 +66,7 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
                            {"witnesses", witnesses},
                            {"basis_slots", sequence.basis.rows},
                            {"frames", frames.frames.size() + frames.tracking.size()},
+                           {"matte_frames", frames.matte.size()},
                            {"missing_slots", frames.basis.lost}};
     for (const auto& one : frames.tracking)
         if (one.number == frames.basis.target) json["tick"] = one.frame->tick;
@@ -136,7 +137,8 @@ class TakeWriter {
     void add_frame(std::shared_ptr<const Frame> frame) {
         const SlotKind kind = sequence_.slots[frame->slot].kind;
         if (next_ == plan_.entries.size() || number_of(*frame, sequence_) < plan_.entries[next_].frames.first) return;
-        if (kind == SlotKind::basis || (is_performance_ && kind == SlotKind::tracking)) store_.add(std::move(frame));
+        const bool is_kept = is_performance_ ? kind != SlotKind::dark : kind == SlotKind::basis;
+        if (is_kept) store_.add(std::move(frame));
     }
     void add_missing(const MissingSlot& slot) { missing_.add(slot); }
 

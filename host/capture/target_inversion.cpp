@@ -18,13 +18,13 @@ namespace {
 // there; short enough that memory is used again and again, and what was loaded is near when it is inverted.
 constexpr size_t band_samples = 1 << 13;
 
-const char* estimate_name(Estimate estimate) {
+const char* prior_name(Estimate estimate) {
     return estimate == Estimate::smooth ? "smooth" : "nonnegative";
 }
 
 // What a target says of its masked samples.
 struct MaskTally {
-    size_t filled = 0, unsolved = 0;
+    size_t filled = 0, unsolved = 0, clipped = 0;
     double worst_gain = 1;
     EstimateFigures estimates;
 
@@ -32,12 +32,13 @@ struct MaskTally {
         nlohmann::json json = {{"filled", filled}, {"unsolved", unsolved}, {"worst_noise_gain", worst_gain}};
         if (estimates.samples > 0)
             json["estimated"] = {{"samples", estimates.samples},
-                                 {"prior", estimate_name(estimate)},
+                                 {"prior", prior_name(estimate)},
                                  {"length_rad", SmoothPrior{}.length_rad},
                                  {"single_share", SmoothPrior{}.single_share},
                                  {"norm_limit", norm_limit},
                                  {"worst_bias", estimates.worst_bias},
                                  {"mean_bias", estimates.mean_bias()}};
+        if (clipped > 0) json["estimated"] = {{"samples", clipped}, {"prior", "clipped"}};
         return json;
     }
 };
@@ -109,7 +110,7 @@ class TargetInversion {
         const auto rows = loaded.pointers();
         const std::vector<const Count*> inputs(rows.begin(), rows.end());
         prepare_gain(band);
-        fill(loaded, rows);
+        fill(band, loaded, rows);
         std::vector<float*> lamps;
         for (int lamp = 0; lamp < basis_.images(); ++lamp)
             lamps.push_back(&target_.lamps[size_t(lamp * target_.planes() + band.channel)][band.first_pixel()]);
@@ -144,7 +145,7 @@ class TargetInversion {
     }
 
     template <typename Count>
-    void fill(const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
+    void fill(const Band& band, const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
         sample_fills_.clear();
         for (const int row : target_.missing_lamps) std::fill_n(rows[size_t(row)], loaded.masked.size(), Count(0));
         if (!needs_filling(loaded)) return;
@@ -152,8 +153,33 @@ class TargetInversion {
         lost_.assign(rows.size(), 0);
         for (const int row : empty_rows(rows_.rows)) lost_[size_t(row)] = 1;
         const RowFiller filler(fills_(), {loaded.black_rest, loaded.white, lost_, noise_}, sample_fills_);
-        if constexpr (!std::is_same_v<Count, int16_t>)
+        if constexpr (!std::is_same_v<Count, int16_t>) {
             fill_rows(filler, rows, loaded.masked);  // load_and_invert() widened
+            if (estimate_ == Estimate::clipped) count_clipped(band, loaded, rows);
+        }
+    }
+
+    // Pixels that were not solved are filled again, with what their saturated samples read: then lost rows alone are masked.
+    template <typename Count>
+    void count_clipped(const Band& band, const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
+        std::vector<uint8_t> unsolved(sample_fills_.size());
+        std::ranges::transform(sample_fills_, unsolved.begin(),
+                               [](const SampleFill& done) { return done.kind == FillKind::unsolved; });
+        if (std::ranges::find(unsolved, 1) == unsolved.end()) return;
+        const RowBand<Sum> clipped = rows_.load(band, like_, calibration_.black, true);
+        for (size_t row = 0; row < rows.size(); ++row)
+            for (size_t p = 0; p < unsolved.size(); ++p)
+                if (unsolved[p]) {
+                    const Sum count = clipped.rows[row][p];
+                    rows[row][p] = is_masked(count) ? masked_sample<Count> : Count(count);
+                }
+        std::vector<SampleFill> again(unsolved.size());
+        fill_rows(RowFiller(fills_(), {loaded.black_rest, loaded.white, lost_, noise_}, again), rows, unsolved);
+        for (size_t p = 0; p < unsolved.size(); ++p) {
+            if (!unsolved[p]) continue;
+            sample_fills_[p] = again[p];
+            if (again[p].kind != FillKind::unsolved) sample_fills_[p].kind = FillKind::clipped;
+        }
     }
 
     void subtract_black_rest(const std::vector<float>& rest, const std::vector<float*>& lamps) {
@@ -180,12 +206,14 @@ class TargetInversion {
                 ++tally_.unsolved;
                 continue;
             }
-            if (done.kind == FillKind::estimated) target_.mask[pixel] |= mask_estimated;
+            if (done.kind != FillKind::solved) target_.mask[pixel] |= mask_estimated;
+            if (done.kind == FillKind::clipped) ++tally_.clipped;
             if (gain > 0) gain = std::max(gain, done.noise_gain);  // of the colours of a pixel, the worst
             tally_.worst_gain = std::max(tally_.worst_gain, double(done.worst_noise_gain));
             ++tally_.filled;
         }
-        judge_estimates(fills_().model(), estimate_, sample_fills_, images, variance, tally_.estimates);
+        if (has_prior(estimate_))
+            judge_estimates(fills_().model(), estimate_, sample_fills_, images, variance, tally_.estimates);
     }
 
     const Rows& rows_;

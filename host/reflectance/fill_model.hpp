@@ -26,7 +26,13 @@ enum class Estimate {
     none,         // the pixel is not solved
     smooth,       // neighbouring lamps give similar values: SmoothPrior
     nonnegative,  // smooth, no value below zero, no saturated sample below white (reflectance/bounded_fill.hpp)
+    clipped,      // no prior: saturated samples count as they were read, each a lower bound
 };
+
+// Whether lamps that are left free are taken from a prior.
+constexpr bool has_prior(Estimate estimate) {
+    return estimate == Estimate::smooth || estimate == Estimate::nonnegative;
+}
 
 // K(i, j) = (1 - single_share) exp((cos(angle between i and j) - 1) / length^2) + single_share [i = j]: a Gaussian of the
 // angle for lamps close by, positive definite on the sphere where a Gaussian of the angle is not (Gneiting, "Strictly and

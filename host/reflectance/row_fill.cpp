@@ -73,7 +73,7 @@ RowFill row_fill(const FillModel& model, const std::vector<int>& masked, Estimat
     const std::vector<int> rest = others(model.rows(), masked);
     const bool solvable = is_solvable(model, masked);
     fill.kind = solvable ? FillKind::solved : FillKind::estimated;
-    if (!solvable && (estimate == Estimate::none || rest.empty())) {
+    if (!solvable && (!has_prior(estimate) || rest.empty())) {
         fill.kind = FillKind::unsolved;
         fill.noise_gain = fill.worst_noise_gain = 0;
         return fill;

@@ -14,6 +14,7 @@ enum class FillKind : uint8_t {
     none,       // nothing was masked
     solved,     // the other rows determine every image
     estimated,  // they and the prior do
+    clipped,    // of a sample only: they do not, and saturated rows count as they were read
     unsolved,   // they do not, and no prior was asked for; or nothing is left
 };
 

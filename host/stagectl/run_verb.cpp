@@ -73,6 +73,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
               {"flow", report.seconds_motion.flow},
               {"planes", report.seconds_motion.planes},
               {"invert", report.seconds_motion.invert},
+              {"matte", report.seconds_motion.matte},
               {"write", report.seconds_write}}}};
 }
 
@@ -94,7 +95,7 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
     if (report.unsolved_share > 0)
         fmt::print(stderr,
                    "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: --estimate "
-                   "smooth or nonnegative estimates them\n",
+                   "clipped counts saturated ones as they were read, smooth or nonnegative estimate lost ones too\n",
                    report.unsolved_share * 100);
     if (report.misaligned_share > 0)
         fmt::print(stderr,
@@ -130,6 +131,7 @@ TakeMasks masks_of(const Options& options) {
     masks.fill_from_neighbours = options.fill == "neighbours";
     if (options.estimate == "smooth") masks.estimate = Estimate::smooth;
     if (options.estimate == "nonnegative") masks.estimate = Estimate::nonnegative;
+    if (options.estimate == "clipped") masks.estimate = Estimate::clipped;
     return masks;
 }
 
@@ -248,8 +250,10 @@ void add_run_verb(CLI::App& app, int& exit_code) {
             "--estimate", options->estimate,
             "pixels whose lost and saturated samples the others do not determine: none: 0 and masked; smooth: "
             "neighbouring lamps give similar values; nonnegative: and no lamp less than nothing, no saturated "
-            "sample less than white; some milliseconds a pixel. Estimates are masked, with a bound of their bias")
-        ->check(CLI::IsMember({"none", "smooth", "nonnegative"}));
+            "sample less than white; some milliseconds a pixel; clipped: saturated samples count as they were read, "
+            "so that a glint is about as bright as the camera's white. Estimates are masked; those of a prior have a "
+            "bound of their bias")
+        ->check(CLI::IsMember({"none", "smooth", "nonnegative", "clipped"}));
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");

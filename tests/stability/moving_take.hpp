@@ -49,12 +49,14 @@ struct Offset {
     double x = 0, y = 0;
 };
 
-// A flat, matte sheet: lamp i gives it albedo * max(0, normal . direction_i).
+// A flat sheet: lamp i gives it albedo * max(0, normal . direction_i), and where it shines albedo * shine(i) besides.
 struct Layer {
     Albedo albedo;
     double radius = INFINITY;                   // of a disc about its centre, pixels; edges blended over a pixel
     std::function<Offset(double)> offset = {};  // of the centre from the image's, after so many slots; none: it stays
     Vec3 normal = {0, 0, 1};
+    std::function<double(int)> shine = {};
+    double board = 0;  // r under the matte board's lamps, times albedo
 };
 
 struct Scene {
@@ -108,7 +110,7 @@ class Take {
         return known;
     }
 
-    // With the frames of half a cycle around the target, and tracking frames of a whole one.
+    // With the frames of half a cycle around the target, and tracking and matte frames of a whole one.
     TargetFrames around(uint64_t target) {
         FrameStore store(sequence_);
         const FrameRange range = frames_around(sequence_, target);
@@ -116,8 +118,8 @@ class Take {
         for (uint64_t number = range.first; number <= range.last; ++number) {
             const SlotKind kind = sequence_.slots[number % sequence_.slots.size()].kind;
             const bool is_near = number + half >= target && number <= target + half;
-            if (!lost_.contains(number) && (kind == SlotKind::tracking || (kind == SlotKind::basis && is_near)))
-                store.add(frame(number));
+            const bool is_needed = kind == SlotKind::tracking || kind == SlotKind::matte || is_near;
+            if (!lost_.contains(number) && kind != SlotKind::dark && is_needed) store.add(frame(number));
         }
         return store.around(0, target);
     }
@@ -144,6 +146,15 @@ class Take {
         std::vector<double> values(seen[0].data.size());
         for (size_t k = 0; k < seen.size(); ++k)
             for (size_t p = 0; p < values.size(); ++p) values[p] += lobe(k, lamp) * double(seen[k].data[p]);
+        return values;
+    }
+
+    // What the matte board's lamps give at the target's time, by pixel.
+    std::vector<double> matte_truth(uint64_t target) {
+        const std::vector<Image>& seen = layers(time_of(target));
+        std::vector<double> values(seen[0].data.size());
+        for (size_t k = 0; k < seen.size(); ++k)
+            for (size_t p = 0; p < values.size(); ++p) values[p] += scene_.layers[k].board * double(seen[k].data[p]);
         return values;
     }
 
@@ -176,7 +187,8 @@ class Take {
     }
 
     double lobe(size_t layer, int lamp) const {
-        return std::max(0.0, dot(scene_.layers[layer].normal, lamps_[size_t(lamp)].direction));
+        const Layer& sheet = scene_.layers[layer];
+        return std::max(0.0, dot(sheet.normal, lamps_[size_t(lamp)].direction)) + (sheet.shine ? sheet.shine(lamp) : 0);
     }
 
     const std::vector<Image>& layers(double time) {
@@ -190,6 +202,8 @@ class Take {
         const double light_us = slot.exposure_ticks / double(ticks_per_us) *
                                 (slot.kind == SlotKind::tracking ? scene_.flicker(time_of(number)) : 1.0);
         std::vector<double> light(seen.size());
+        for (size_t k = 0; k < seen.size(); ++k)
+            light[k] = slot.kind == SlotKind::matte ? counts_per_us * light_us * scene_.layers[k].board : 0;
         for (size_t k = 0; k < seen.size(); ++k)
             for (int lamp = 0; lamp < sphere_lamp_count; ++lamp)
                 light[k] += slot.lit[size_t(lamp)] ? counts_per_us * light_us * lobe(k, lamp) : 0;

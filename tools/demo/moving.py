@@ -31,7 +31,7 @@ def record(clock, out):
             with VirtualStage(SCENE, STAGE, out / f"stage/moving_{quality}") as stage:
                 takes[quality] = run_json(
                     BIN / "stagectl", "run", "--basis", BASIS, "--cycles", CYCLES, "--fps", FPS, "--quality", quality, "--stage", STAGE,
-                    *stage.devices(), "--nominal",
+                    *stage.devices(), "--nominal", "--estimate", "clipped",
                     "--production", "demo", "--scene", "moving head", "--take", quality, "-o", out / f"moving_{quality}.rfa", "--json")
     return takes
 

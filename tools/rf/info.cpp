@@ -34,6 +34,7 @@ json target_report(const ArchiveReader& archive, const TargetEntry& entry) {
     report["missing_lamps"] = head->missing_lamps;
     report["provenance"] = head->provenance;
     report["motion_times_s"] = head->motion.times_s;
+    report["matte_frames"] = head->matte.frames;
     return report;
 }
 
@@ -53,6 +54,7 @@ std::string target_line(const json& target) {
     if (target.contains("damaged")) return name + ": damaged: " + target["damaged"].get<std::string>();
     auto line = fmt::format("{}: {} x {}, {}, {:.1f} MB", name, target["width"].get<int>(), target["height"].get<int>(),
                             target["pixels"].get<std::string>(), target["bytes"].get<double>() / 1e6);
+    if (const int frames = target["matte_frames"]; frames > 0) line += fmt::format(", matte of {} frames", frames);
     if (const auto& times = target["motion_times_s"]; !times.empty())
         line += fmt::format(", motion at {} instants from {:+.1f} to {:+.1f} ms", times.size(),
                             times.front().get<double>() * 1e3, times.back().get<double>() * 1e3);
