@@ -34,11 +34,11 @@ namespace ols {
 
 // The bits of a mask sample.
 enum MaskBit : uint32_t {
-    mask_saturated = 1,   // a sample that these lamp values would rest on was at or above white, and was left out
+    mask_saturated = 1,   // a sample under these lamp values was at or above white: left out, or counted as it was read
     mask_missing = 2,     // a slot was missing
     mask_outside = 4,     // outside the user's mask (ingest)
     mask_clamped = 8,     // not finite or beyond the sample type's range; stored as 0 (NaN) or the largest finite value
-    mask_estimated = 16,  // what was left did not determine the lamp values: a prior did, which the provenance names
+    mask_estimated = 16,  // what was left did not determine the lamp values: the provenance names what did
     mask_unsolved = 32,   // nothing did; the lamp values are 0
     mask_misaligned = 64,  // motion compensation failed: `confidence` is below one half
 };

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
-// From knots to intervals of even motion, for each place of a mosaic, and the rounding.
+// From knots to intervals of even motion, and the rounding.
 #include "capture/align.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
+#include "capture/signal_planes.hpp"
 #include "parallel.hpp"
 
 namespace ols {
@@ -35,33 +37,26 @@ void align_samples(std::span<const float> samples, std::span<int32_t> aligned) {
     for (size_t i = 0; i < samples.size(); ++i) aligned[i] = int32_t(samples[i] + std::copysign(0.5f, samples[i]));
 }
 
-Alignment::Alignment(const MotionPath& path, int width, int height, Cfa cfa, float line_tolerance_px, int threads) {
-    const std::vector<ColorPlace> places = color_places(cfa);
+Alignment::Alignment(const MotionPath& path, int width, int height, Cfa cfa, float line_tolerance_steps, int threads) {
+    const SampleGrid grid = sample_grid(width, height, cfa);
     if (path.size() == 1) {
-        Interval& still = intervals_.emplace_back();
-        still.first_tick = path[0].tick, still.last_tick = path[0].tick + 1;
-        for (const ColorPlace& place : places)
-            still.planes.emplace_back(FlowField(place.width(width), place.height(height)),
-                                      FlowField(place.width(width), place.height(height)), line_tolerance_px);
-        still.confidence.assign(size_t(width) * size_t(height), 0.0f);
+        const FlowField still(width, height);
+        intervals_.push_back({path[0].tick, path[0].tick + 1, {still, still, grid, line_tolerance_steps}, {}});
+        intervals_[0].confidence.assign(still.size(), 0.0f);
         return;
     }
-    std::vector<std::vector<float>> confidences(path.size());
-    for_each_index(threads, path.size(),
-                   [&](size_t k) { confidences[k] = enlarged(path[k].confidence, path[k].flow, width, height); });
-    intervals_.resize(path.size() - 1);
-    for_each_index(threads, intervals_.size(), [&](size_t k) {
-        Interval& interval = intervals_[k];
-        interval.first_tick = path[k].tick, interval.last_tick = path[k + 1].tick;
-        const FlowField step = difference(path[k + 1].flow, path[k].flow);
-        for (const ColorPlace& place : places)
-            interval.planes.emplace_back(path[k].flow, step,
-                                         PlaneGrid{width, height, place.step, place.first_x, place.first_y},
-                                         line_tolerance_px);
-        interval.confidence.resize(confidences[k].size());
-        std::ranges::transform(confidences[k], confidences[k + 1], interval.confidence.begin(),
+    std::vector<std::optional<Interval>> made(path.size() - 1);
+    for_each_index(threads, made.size(), [&](size_t k) {
+        const MotionKnot &first = path[k], &last = path[k + 1];
+        std::vector<float> worse(first.confidence.size());
+        std::ranges::transform(first.confidence, last.confidence, worse.begin(),
                                [](float a, float b) { return std::min(a, b); });
+        made[k] = Interval{first.tick,
+                           last.tick,
+                           {first.flow, difference(last.flow, first.flow), grid, line_tolerance_steps},
+                           enlarged(worse, first.flow, width, height)};
     });
+    for (auto& interval : made) intervals_.push_back(std::move(*interval));
 }
 
 Alignment::Place Alignment::place_of(double tick) const {

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "capture/color_planes.hpp"
+#include "image/frame.hpp"
+#include "reflectance/group_motion.hpp"
 #include "reflectance/tracking_flows.hpp"
-#include "reflectance/warp.hpp"
 
 namespace ols {
 
@@ -25,12 +25,12 @@ inline double middle_tick(const Frame& frame) {
 // A pixel whose confidence (flow.hpp) is less has a flow that misses by more than is allowed.
 constexpr float trusted_confidence = 0.5f;
 
-// Where a target's pixels are found at other times, made ready for the colour planes of its frames. What leads outside the
-// image takes its edge, and is not trusted.
+// Where a target's pixels are found at other times, made ready for the samples of its frames. What leads outside the image takes
+// its edge, and is not trusted.
 class Alignment {
   public:
-    // `path` has the target's instant among its knots. line_tolerance_px: GroupMotion's.
-    Alignment(const MotionPath& path, int width, int height, Cfa cfa, float line_tolerance_px, int threads);
+    // `path` has the target's instant among its knots. line_tolerance_steps: GroupMotion's.
+    Alignment(const MotionPath& path, int width, int height, Cfa cfa, float line_tolerance_steps, int threads);
 
     // Between two knots the subject moves evenly; beyond the first and the last it goes on as before. A path of a single
     // knot says nothing of motion: one interval, in which all stands still and nothing is trusted.
@@ -40,7 +40,7 @@ class Alignment {
     };
     Place place_of(double tick) const;
 
-    const GroupMotion& motion(size_t interval, size_t plane) const { return intervals_[interval].planes[plane]; }
+    const GroupMotion& motion(size_t interval) const { return intervals_[interval].motion; }
     // Of each pixel of the target, the lower of the interval's two knots.
     const std::vector<float>& confidence(size_t interval) const { return intervals_[interval].confidence; }
     size_t intervals() const { return intervals_.size(); }
@@ -48,7 +48,7 @@ class Alignment {
   private:
     struct Interval {
         double first_tick, last_tick;
-        std::vector<GroupMotion> planes;  // by color_places()
+        GroupMotion motion;
         std::vector<float> confidence;
     };
     std::vector<Interval> intervals_;

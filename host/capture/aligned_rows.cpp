@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Warping a band of pixel rows at a time, every colour plane by itself, straight into the rows that are inverted.
+// Warping a band of pixel rows at a time, straight into the rows that are inverted.
 #include "capture/aligned_rows.hpp"
 
 #include <algorithm>
@@ -8,44 +8,32 @@
 #include <optional>
 #include <type_traits>
 
-#include "parallel.hpp"
 #include "reflectance/masked_sample.hpp"
+#include "reflectance/warp.hpp"
 
 namespace ols {
 
 namespace {
 
-// A band of pixel rows in one colour plane.
-struct PlaneBand {
-    ColorPlace place;
-    size_t plane;
-    RowRange rows;  // of the plane
-};
-
-// The planes that a channel of the band consists of: all four of a mosaic.
-std::vector<PlaneBand> planes_of(const Band& band, Cfa cfa) {
-    std::vector<PlaneBand> planes;
-    const auto places = color_places(cfa);
-    for (size_t i = 0; i < places.size(); ++i) {
-        const ColorPlace& place = places[i];
-        if (band.channels == 3 && place.channel != band.channel) continue;
-        const auto until = [&](size_t row) { return place.height(int(row)); };  // rows of the plane above a frame's row
-        planes.push_back(
-            {place, i, {until(band.first_row), until(band.first_row + band.rows) - until(band.first_row)}});
-    }
-    return planes;
+RowRange range_of(const Band& band) {
+    return {int(band.first_row), int(band.rows)};
 }
 
-void warp(const ColorPlanes<int16_t>::Plane& plane, int largest, const GroupMotion& motion, float fraction,
-          const RowRange& rows, int16_t* out) {
-    const auto pitch = size_t(plane.width);
-    warp_counts({plane.samples.data(), plane.width, plane.height, pitch, largest, true}, motion, fraction, rows, out,
-                pitch);
+using CountChannels = SignalPlanes<int16_t>::Channels;
+using SampleChannels = SignalPlanes<float>::Channels;
+
+// False where it is known that no sample is masked.
+bool warp(const CountChannels& channels, int largest, const GroupMotion& motion, float fraction, const Band& band,
+          int16_t* out) {
+    const auto& plane = channels[size_t(band.channel)];
+    return warp_counts({plane.row(0), plane.grid(), plane.pitch(), largest, true, plane.margin}, motion, fraction,
+                       range_of(band), out, band.width);
 }
-void warp(const ColorPlanes<float>::Plane& plane, int, const GroupMotion& motion, float fraction, const RowRange& rows,
+bool warp(const SampleChannels& channels, int, const GroupMotion& motion, float fraction, const Band& band,
           float* out) {
-    const auto pitch = size_t(plane.width);
-    warp_samples({plane.samples.data(), plane.width, plane.height, pitch, true}, motion, fraction, rows, out, pitch);
+    const auto& plane = channels[size_t(band.channel)];
+    warp_samples({plane.row(0), plane.grid(), plane.pitch(), true}, motion, fraction, range_of(band), out, band.width);
+    return true;
 }
 
 template <typename Sum, typename Sample>
@@ -54,69 +42,16 @@ Sum rounded(Sample sample) {
     return is_masked(sample) ? masked_sample<Sum> : Sum(sample + std::copysign(Sample(0.5), sample));
 }
 
-// Interleaves the rows of two colour planes, as they lie in a mosaic's row.
-template <typename Sum, typename Sample>
-void interleave(const Sample* even, const Sample* odd, size_t width, Sum* out) {
-    for (size_t x = 0; x < width / 2; ++x) {
-        out[2 * x] = rounded<Sum>(even[x]);
-        out[2 * x + 1] = rounded<Sum>(odd[x]);
-    }
-    if (width % 2) out[width - 1] = rounded<Sum>(even[width / 2]);
+bool warp(const SampleChannels& channels, int largest, const GroupMotion& motion, float fraction, const Band& band,
+          int32_t* out) {
+    std::vector<float, PlaneAllocator<float>> warped(band.samples());
+    warp(channels, largest, motion, fraction, band, warped.data());
+    std::ranges::transform(warped, out, rounded<int32_t, float>);
+    return true;
 }
-
-// Warps a band of one source after the other.
-template <typename Sample, typename Sum>
-class BandWarp {
-  public:
-    using Rows = AlignedRows<Sample, Sum>;
-    using Source = typename Rows::Source;
-
-    BandWarp(const Rows& rows, const Band& band, Cfa cfa) : rows_(rows), band_(band), parts_(planes_of(band, cfa)) {}
-
-    // `planes` are the source's, or its clipped ones.
-    void warp(const Source& source, const std::vector<typename ColorPlanes<Sample>::Plane>& planes, Sum* out) {
-        if constexpr (std::is_same_v<Sum, Sample>)
-            if (parts_.size() == 1) return warp_part(source, planes, parts_[0], out);
-        warped_.resize(parts_.size());
-        for (size_t i = 0; i < parts_.size(); ++i) {
-            warped_[i].resize(size_t(planes[parts_[i].plane].width) * size_t(parts_[i].rows.count));
-            warp_part(source, planes, parts_[i], warped_[i].data());
-        }
-        if (parts_.size() == 1)
-            std::ranges::transform(warped_[0], out, rounded<Sum, Sample>);
-        else
-            interleave_mosaic(out);
-    }
-
-  private:
-    void warp_part(const Source& source, const std::vector<typename ColorPlanes<Sample>::Plane>& planes,
-                   const PlaneBand& part, Sample* out) const {
-        ols::warp(planes[part.plane], source.planes->largest,
-                  rows_.alignment->motion(source.place.interval, part.plane), source.place.fraction, part.rows, out);
-    }
-
-    void interleave_mosaic(Sum* out) const {
-        const size_t even_width = (band_.width + 1) / 2, odd_width = band_.width / 2;
-        for (size_t parity = 0; parity < 2; ++parity) {  // parts 0 and 1 make the even rows, 2 and 3 the odd ones
-            const PlaneBand& part = parts_[2 * parity];
-            for (size_t y = 0; y < size_t(part.rows.count); ++y) {
-                const size_t row = 2 * (size_t(part.rows.first) + y) + parity - band_.first_row;
-                interleave(&warped_[2 * parity][y * even_width], &warped_[2 * parity + 1][y * odd_width], band_.width,
-                           out + row * band_.width);
-            }
-        }
-    }
-
-    const Rows& rows_;
-    const Band& band_;
-    const std::vector<PlaneBand> parts_;
-    std::vector<std::vector<Sample, PlaneAllocator<Sample>>> warped_;
-};
 
 template <typename Sum>
 void set_black(RowBand<Sum>& loaded, const Band& band, const Frame& like, const Image& black) {
-    loaded.black_rest.resize(band.samples());
-    loaded.white.resize(band.samples());
     for (size_t p = 0; p < band.samples(); ++p) {
         const float counts = black.data[(band.first_pixel() + p) * size_t(band.channels) + size_t(band.channel)];
         const float taken = like.format == PixelFormat::u16 ? std::round(counts) : counts;
@@ -140,28 +75,35 @@ std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
     return least;
 }
 
-// A frame that saturates nowhere lacks no sample: what motion leads to outside it takes its edge.
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay,
-                                        const FollowedBrightness* brightness, std::span<Sum> out,
-                                        std::vector<uint8_t>& marks) const {
+void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, bool clipped_stay,
+                                        const FollowedBrightness<Sum>* brightness, RowBand<Sum>& loaded) const {
+    const std::span<Sum> out(loaded.row(row), band.samples());
+    std::vector<uint8_t>& masked = loaded.masked;
     const std::vector<Source>& sources = rows[row];
     std::vector<float> sums(sources.size() > 1 ? out.size() : 0), counts(sums.size());
-    BandWarp<Sample, Sum> warp(*this, band, cfa);
-    if (sources.empty()) std::ranges::fill(out, masked_sample<Sum>), marks.assign(out.size(), mask_missing);
-    for (const Source& source : sources) {
-        warp.warp(source, source.planes->planes, out.data());
-        if (source.planes->any_masked) {
-            marks.resize(out.size());
-            for (size_t p = 0; p < out.size(); ++p) marks[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
-            if (clipped_stay) warp.warp(source, source.planes->clipped, out.data());
+    std::vector<Sum, PlaneAllocator<Sum>> clipped;
+    if (sources.empty()) {
+        std::ranges::fill(out, masked_sample<Sum>);
+        for (uint8_t& mark : masked) mark |= mask_missing;
+    }
+    for (const auto& [planes, place] : sources) {
+        const GroupMotion& motion = alignment->motion(place.interval);
+        const bool may_lack = warp(planes->channels, planes->largest, motion, place.fraction, band, out.data());
+        if (brightness) brightness->apply(place, loaded, row);
+        if (planes->any_masked && may_lack) {
+            for (size_t p = 0; p < out.size(); ++p) masked[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
+            if (clipped_stay) {
+                clipped.resize(out.size());
+                warp(planes->clipped, planes->largest, motion, place.fraction, band, clipped.data());
+                for (size_t p = 0; p < out.size(); ++p)
+                    if (is_masked(out[p])) out[p] = clipped[p];
+            }
         }
-        if (brightness) brightness->apply(source.place, out);
         if (masks_untrusted) {
-            const float* trust = alignment->confidence(source.place.interval).data() + band.first_pixel();
-            marks.resize(out.size());
+            const float* trust = alignment->confidence(place.interval).data() + band.first_pixel();
             for (size_t p = 0; p < out.size(); ++p)
-                if (trust[p] < trusted_confidence) out[p] = masked_sample<Sum>, marks[p] |= mask_misaligned;
+                if (trust[p] < trusted_confidence) out[p] = masked_sample<Sum>, masked[p] |= mask_misaligned;
         }
         for (size_t p = 0; p < sums.size(); ++p)
             if (!is_masked(out[p])) sums[p] += float(out[p]), ++counts[p];
@@ -173,19 +115,12 @@ void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, Cfa cfa, b
 template <typename Sample, typename Sum>
 RowBand<Sum> AlignedRows<Sample, Sum>::load(const Band& band, const Frame& like, const Image& black,
                                             bool clipped_stay) const {
-    RowBand<Sum> loaded;
-    loaded.rows.resize(rows.size());
-    loaded.masked.assign(band.samples(), 0);
+    RowBand<Sum> loaded(rows.size(), band.samples());
     set_black(loaded, band, like, black);
-    std::optional<FollowedBrightness> brightness;
-    if (tracking) brightness.emplace(tracking->load(band, like, black, false).rows, instant, noise);
-    std::vector<std::vector<uint8_t>> marks(rows.size());
-    for_each_index(threads, rows.size(), [&](size_t row) {
-        loaded.rows[row].resize(band.samples());
-        load_row(row, band, like.cfa, clipped_stay, brightness ? &*brightness : nullptr, loaded.rows[row], marks[row]);
-    });
-    for (const auto& some : marks)
-        for (size_t p = 0; p < some.size(); ++p) loaded.masked[p] |= some[p];
+    std::optional<FollowedBrightness<Sum>> brightness;
+    if (tracking) brightness.emplace(tracking->load(band, like, black, false), tracking_light, instant, noise);
+    for (size_t row = 0; row < rows.size(); ++row)
+        load_row(row, band, clipped_stay, brightness ? &*brightness : nullptr, loaded);
     return loaded;
 }
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "capture/align.hpp"
-#include "capture/color_planes.hpp"
 #include "capture/followed_brightness.hpp"
 #include "capture/row_band.hpp"
+#include "capture/signal_planes.hpp"
 
 namespace ols {
 
@@ -19,19 +19,19 @@ template <typename Sample, typename Summed>
 struct AlignedRows {
     using Sum = Summed;
     struct Source {
-        std::shared_ptr<const ColorPlanes<Sample>> planes;
+        std::shared_ptr<const SignalPlanes<Sample>> planes;
         Alignment::Place place;
     };
     std::vector<std::vector<Source>> rows;  // by basis row; none where it was lost
     std::shared_ptr<const Alignment> alignment;
-    // Whether samples of pixels that are not trusted are masked, for an estimate to fill in. Otherwise they stay as they
+    // Whether samples of pixels that are not trusted are masked, for an estimate with a prior to fill in. Otherwise they stay as they
     // are: rows that lost a whole group of slots determine no lamp.
     bool masks_untrusted = false;
     // The tracking frames, a row for each knot of the alignment, whose brightness samples follow; null: they do not.
     std::shared_ptr<const AlignedRows> tracking;
-    size_t instant = 0;  // the target's knot
-    NoiseModel noise;    // of the camera
-    int threads = 0;     // 0: as many as there are processors. Any number gives the same bits.
+    std::vector<float> tracking_light;  // relative_light() of these
+    size_t instant = 0;                 // the target's knot
+    NoiseModel noise;                   // of the camera
 
     // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` saturated samples count like others,
     // marked all the same.
@@ -43,10 +43,9 @@ struct AlignedRows {
     std::vector<float> confidence() const;
 
   private:
-    // `marks` stays empty where nothing is masked.
     // `brightness` may be null.
-    void load_row(size_t row, const Band& band, Cfa cfa, bool clipped_stay, const FollowedBrightness* brightness,
-                  std::span<Sum> out, std::vector<uint8_t>& marks) const;
+    void load_row(size_t row, const Band& band, bool clipped_stay, const FollowedBrightness<Sum>* brightness,
+                  RowBand<Sum>& loaded) const;
 };
 
 }  // namespace ols

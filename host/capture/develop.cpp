@@ -54,19 +54,27 @@ Developer::Developer(const Sequence& sequence, const CameraCalibration& calibrat
 Developer::~Developer() = default;
 
 FillCache& Developer::fills() {
-    if (!fills_) {
+    std::call_once(fills_made_, [this] {
         model_ = fill_model(sequence_.basis);
         if (has_prior(options_.estimate)) add_smooth_prior(model_, image_lights(sequence_.basis, options_.lamps));
         fills_ = std::make_unique<FillCache>(model_, options_.estimate);
-    }
+    });
     return *fills_;
+}
+
+bool Developer::stands_alone() const {
+    return !has_prior(options_.estimate) && is_one_image_a_row(sequence_.basis);
+}
+
+bool Developer::keeps_clipped() const {
+    return stands_alone() || options_.estimate == Estimate::clipped;
 }
 
 template <typename Rows>
 Result<Target> Developer::invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots) {
     const std::vector<int> lost = empty_rows(rows.rows);
     const Basis& basis = sequence_.basis;
-    const bool stand_alone = !has_prior(options_.estimate) && is_one_image_a_row(basis);
+    const bool stand_alone = stands_alone();
     if (!lost.empty() && !stand_alone && fills().fill_for(lost)->kind == FillKind::unsolved)
         return fail(
             fmt::format("every lamp of basis {} rests on all rows, slots {} are missing, and the other rows do not "

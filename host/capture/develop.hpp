@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <variant>
 #include <vector>
@@ -63,15 +64,20 @@ class Developer {
     // The target has a confidence, and mask_misaligned where it is below trusted_confidence.
     Result<Target> develop(const AlignedFrames& frames, const std::vector<int>& missing_slots);
 
+    // Whether saturated samples may count as they were read, so that rows must have them.
+    bool keeps_clipped() const;
+
   private:
     template <typename Rows>
     Result<Target> invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots);
-    FillCache& fills();  // made when the first sample is masked
+    bool stands_alone() const;  // every row is an image of its own, and what it lacks is not estimated
+    FillCache& fills();         // made when the first sample is masked, by whichever thread meets it
 
     const Sequence& sequence_;
     const CameraCalibration& calibration_;
     const NoiseModel noise_;
     const DevelopOptions options_;
+    std::once_flag fills_made_;
     FillModel model_;
     std::unique_ptr<FillCache> fills_;
 };

@@ -7,10 +7,16 @@
 #include <vector>
 
 #include "capture/align.hpp"
-#include "image/plane.hpp"
+#include "capture/row_band.hpp"
 #include "stage/stage.hpp"
 
 namespace ols {
+
+// By knot: how bright its tracking frame was lit, relative to the target's own, 1 of itself: the median over the pixels that stand
+// at least ten standard deviations of their noise above black in both, which those that changed do not move much. 1 where
+// these are fewer than 64. `bands`: parts of the frames, a row for each knot, brought to the target.
+template <typename Sum>
+std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t instant, const NoiseModel& noise);
 
 // Where alignment finds no counterpart (a lid that opens, an outline that moves, a shadow that passes), a pixel's samples show
 // something of another brightness than the target does. The tracking frames, aligned like the samples, tell how much: a sample
@@ -18,30 +24,29 @@ namespace ols {
 // where what is seen at both moments differs in albedo alone; else the sum over all lamps is right and its share among them is
 // that of the other moment. Our own addition to Wenger section 6, after the quotients of Peers et al. 2007.
 //
+// Light that all pixels have more or less of is the lamps' in the tracking slots, not the subject's: it is taken out before.
+//
 // T between two tracking frames is linear in time. Samples stay to the bit where T and T0 differ by less than six standard
 // deviations of the camera's noise in their difference, and where either is not known. The factor stays within 1/4 and 4,
 // as the sample's noise is multiplied with it.
+template <typename Sum>
 class FollowedBrightness {
   public:
-    // By knot of the alignment: a band of the tracking frame's samples, brought to the target, in counts above black.
-    template <typename Sum>
-    using Knots = std::vector<std::vector<Sum, PlaneAllocator<Sum>>>;
+    // `knots`: the same band as the samples; a row for each knot of the alignment, its tracking frame's samples brought to the
+    // target, in counts above black. `light`: relative_light() of the knots. `instant`: the target's own.
+    FollowedBrightness(RowBand<Sum> knots, std::vector<float> light, size_t instant, const NoiseModel& noise);
 
-    // `instant`: the target's knot.
-    template <typename Sum>
-    FollowedBrightness(const Knots<Sum>& knots, size_t instant, const NoiseModel& noise);
-
-    // `samples`: the same band of a slot, brought to the target. Masked ones stay.
-    template <typename Sum>
-    void apply(const Alignment::Place& place, std::span<Sum> samples) const;
+    // Row `row` of a band of the same size: a slot's samples, brought to the target. Masked ones stay. Integers are rounded, half
+    // away from zero, and held to what the inversion takes: 16383 of shorts, 2^23 - 1 of others. The same bits on every SIMD
+    // path.
+    void apply(const Alignment::Place& place, RowBand<Sum>& band, size_t row) const;
 
   private:
-    struct Change {
-        uint32_t sample;
-        float first, last;  // T at the interval's ends
-        float now, least;   // T0, and the difference that counts
-    };
-    std::vector<std::vector<Change>> changes_;  // by interval: the samples that may change within
+    RowBand<Sum> knots_;
+    std::vector<float> scale_;  // by knot: brings its samples to the target's light
+    size_t instant_;
+    std::vector<float> least_;  // of each sample: the difference that counts; infinite where T0 is not known
+    std::vector<std::vector<uint32_t>> blocks_;  // by interval: blocks of samples of which some may change within
 };
 
 }  // namespace ols

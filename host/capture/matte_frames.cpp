@@ -62,10 +62,9 @@ class MatteMean {
         const auto black = black_planes<Sample>(job.calibration.black, like_.cfa, like_.format);
         rows_.rows.resize(job.frames.size());
         rows_.alignment = job.alignment;
-        rows_.threads = job.threads;
         for_each_index(job.threads, job.frames.size(), [&](size_t i) {
             const Frame& frame = *job.frames[i].frame;
-            rows_.rows[i].push_back({std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(frame, black)),
+            rows_.rows[i].push_back({std::make_shared<SignalPlanes<Sample>>(signal_planes(frame, black, true)),
                                      job.alignment->place_of(middle_tick(frame))});
         });
     }
@@ -76,11 +75,13 @@ class MatteMean {
         const size_t pixels = size_t(like_.width) * like_.height;
         matte.planes.assign(like_.cfa == Cfa::rgb ? 3 : 1, std::vector<float>(pixels));
         if (like_.format == PixelFormat::u16) matte.variance.assign(pixels, 0);
-        const size_t band_rows = std::max<size_t>(2, band_samples / like_.width / 2 * 2);
-        for (size_t y = 0; y < like_.height; y += band_rows)
+        const size_t band_rows = std::max<size_t>(1, band_samples / like_.width);
+        for_each_index(job_.threads, (like_.height + band_rows - 1) / band_rows, [&](size_t b) {
+            const size_t y = b * band_rows;
             for (int channel = 0; channel < int(matte.planes.size()); ++channel)
                 average({y, std::min(band_rows, like_.height - y), like_.width, channel, int(matte.planes.size())},
                         matte);
+        });
         return matte;
     }
 
@@ -119,9 +120,9 @@ class MatteMean {
 
     template <bool trusted>
     void add_rows(const RowBand<Sum>& band, const Band& place, Means& means) const {
-        for (size_t i = 0; i < band.rows.size(); ++i) {
+        for (size_t i = 0; i < band.rows(); ++i) {
             const auto& confidence = job_.alignment->confidence(rows_.rows[i][0].place.interval);
-            add<trusted>(band.rows[i].data(), confidence.data() + place.first_pixel(), float(job_.weights[i]), means);
+            add<trusted>(band.row(i), confidence.data() + place.first_pixel(), float(job_.weights[i]), means);
         }
     }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Flow, planes, rows, inversion, one after the other; each runs on several threads by itself.
+// Flow, planes, rows, inversion, matte, one after the other; each runs on several threads by itself.
 #include "capture/motion_developer.hpp"
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "capture/tracking_image.hpp"
 #include "parallel.hpp"
 
 namespace ols {
@@ -103,9 +104,23 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
     return flows_.path(instant_of(frames, sequence_), from, to);
 }
 
+// relative_light() of every eighth pair of pixel rows: some thousands of pixels.
+template <typename Rows>
+static std::vector<float> light_of(const Rows& tracking, const Frame& like, const Image& black, size_t instant,
+                                   const NoiseModel& noise) {
+    constexpr size_t rows = 2, apart = 16;
+    const int channels = samples_per_pixel(like.cfa);
+    std::vector<RowBand<typename Rows::Sum>> bands;
+    for (size_t y = 0; y < like.height; y += apart)
+        for (int channel = 0; channel < channels; ++channel)
+            bands.push_back(
+                tracking.load({y, std::min(rows, like.height - y), like.width, channel, channels}, like, black, false));
+    return relative_light<typename Rows::Sum>(bands, instant, noise);
+}
+
 template <typename Sample, typename Sum>
 void MotionDeveloper::follow_brightness(const TargetFrames& frames, const MotionPath& path,
-                                        const ColorPlanes<Sample>& black, AlignedRows<Sample, Sum>& aligned) const {
+                                        const SignalPlanes<Sample>& black, AlignedRows<Sample, Sum>& aligned) const {
     const auto frame_at = [&](const MotionKnot& knot) {
         return std::ranges::find(frames.tracking, knot.tick, [](const auto& one) { return middle_tick(*one.frame); });
     };
@@ -115,15 +130,15 @@ void MotionDeveloper::follow_brightness(const TargetFrames& frames, const Motion
     auto tracking = std::make_shared<AlignedRows<Sample, Sum>>();
     tracking->rows.resize(path.size());
     tracking->alignment = aligned.alignment;
-    tracking->threads = options_.threads;
     for_each_index(options_.threads, path.size(), [&](size_t k) {
         const auto found = frame_at(path[k]);
         if (found == frames.tracking.end()) return;
-        auto planes = std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*found->frame, black));
+        auto planes = std::make_shared<SignalPlanes<Sample>>(signal_planes<Sample>(*found->frame, black, false));
         tracking->rows[k] = {{std::move(planes), aligned.alignment->place_of(path[k].tick)}};
     });
-    aligned.tracking = std::move(tracking);
     aligned.instant = size_t(instant - path.begin());
+    aligned.tracking_light = light_of(*tracking, *frames.frames.front(), calibration_.black, aligned.instant, noise_);
+    aligned.tracking = std::move(tracking);
     aligned.noise = noise_;
 }
 
@@ -134,16 +149,16 @@ AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, cons
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
     aligned.masks_untrusted = has_prior(options_.estimate);
-    aligned.threads = options_.threads;
     const Frame& like = *frames.frames.front();
     if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
-    std::vector<std::shared_ptr<const ColorPlanes<Sample>>> planes(frames.frames.size());
+    std::vector<std::shared_ptr<const SignalPlanes<Sample>>> planes(frames.frames.size());
     for_each_index(options_.threads, planes.size(), [&](size_t i) {
         const auto found = ready.planes.find(frames.basis.choices[i].number);
         if (found != ready.planes.end())
             planes[i] = found->second;
         else
-            planes[i] = std::make_shared<ColorPlanes<Sample>>(color_planes<Sample>(*frames.frames[i], *ready.black));
+            planes[i] = std::make_shared<SignalPlanes<Sample>>(
+                signal_planes<Sample>(*frames.frames[i], *ready.black, developer_.keeps_clipped()));
     });
     ready.planes.clear();
     for (size_t i = 0; i < planes.size(); ++i) {
@@ -163,7 +178,7 @@ Result<AlignedFrames> MotionDeveloper::align(const TargetFrames& frames, const M
     {
         const Stopwatch watch(times_.flow);
         alignment = std::make_shared<Alignment>(path, int(like.width), int(like.height), like.cfa,
-                                                quality_.line_tolerance_px, options_.threads);
+                                                quality_.line_tolerance_steps, options_.threads);
     }
     AlignedFrames aligned;
     aligned.like = frames.frames.front();
@@ -183,7 +198,7 @@ TargetMatte MotionDeveloper::matte_of(const TargetFrames& frames, std::shared_pt
     const int width = int(like.width), height = int(like.height);
     if (!alignment)
         alignment = std::make_shared<Alignment>(still_path(double(like.tick), width, height), width, height, like.cfa,
-                                                quality_.line_tolerance_px, options_.threads);
+                                                quality_.line_tolerance_steps, options_.threads);
     const std::vector<double> weights = matte_weights(frames.matte, frames.basis.target, sequence_);
     return mean_matte({frames.matte, weights, std::move(alignment), calibration_, noise_, options_.threads});
 }

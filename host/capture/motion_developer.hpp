@@ -66,8 +66,8 @@ class MotionDeveloper {
     // The frames of the last target, ready to be warped.
     template <typename Sample>
     struct Ready {
-        std::optional<ColorPlanes<Sample>> black;
-        std::map<uint64_t, std::shared_ptr<const ColorPlanes<Sample>>> planes;  // by number
+        std::optional<SignalPlanes<Sample>> black;
+        std::map<uint64_t, std::shared_ptr<const SignalPlanes<Sample>>> planes;  // by number
     };
 
     Result<MotionPath> find_path(const TargetFrames& frames);
@@ -75,7 +75,7 @@ class MotionDeveloper {
     AlignedRows<Sample, Sum> align(const TargetFrames& frames, const MotionPath& path,
                                    std::shared_ptr<const Alignment> alignment, Ready<Sample>& ready);
     template <typename Sample, typename Sum>
-    void follow_brightness(const TargetFrames& frames, const MotionPath& path, const ColorPlanes<Sample>& black,
+    void follow_brightness(const TargetFrames& frames, const MotionPath& path, const SignalPlanes<Sample>& black,
                            AlignedRows<Sample, Sum>& aligned) const;
     Result<AlignedFrames> align(const TargetFrames& frames, const MotionPath& path);
     // Empty where the target has no matte frames; unwarped without an alignment.

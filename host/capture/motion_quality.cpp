@@ -8,12 +8,12 @@ namespace {
 
 std::vector<MotionQuality> presets() {
     const auto method = [](const char* name) { return *flow_method(name); };
-    // At half resolution patches find what moves far more surely than a pyramid does.
-    const FlowOptions quick{DisFlowOptions{.finest_scale = 1, .patch_stride = 4, .iterations = 12, .refinements = 0}};
+    // In small images patches find what moves far more surely than a pyramid does.
+    const FlowOptions quick{DisFlowOptions{.finest_scale = 0, .patch_stride = 5, .iterations = 12, .refinements = 0}};
     return {{},
-            {"preview", true, {.local = quick, .refinement = {}, .reduction = 2}, 0.1f},
-            {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}, 0.02f},
-            {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.005f}};
+            {"preview", true, {.local = quick, .refinement = {}, .reduced_side = 120}, 0.4f},
+            {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}},
+            {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.05f}};
 }
 
 }  // namespace

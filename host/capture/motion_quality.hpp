@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "reflectance/group_motion.hpp"
 #include "reflectance/tracking_flows.hpp"
 #include "result.hpp"
 
@@ -15,8 +16,8 @@ struct MotionQuality {
     // Without, frames are taken as they are.
     bool compensates = false;
     TrackingFlowOptions flow = {};
-    // Runs of eight pixels whose vectors lie that near to a line are warped along it (warp.hpp).
-    float line_tolerance_px = 0.02f;
+    // Runs of samples whose vectors lie that near to a line are warped along it (group_motion.hpp).
+    float line_tolerance_steps = GroupMotion::default_tolerance;
     // Whether samples follow the brightness of the tracking frames where alignment leaves it different
     // (capture/followed_brightness.hpp).
     bool follows_brightness = true;

@@ -25,8 +25,6 @@ const SampleOf<Sum>* samples_of(const Frame& frame, const Band& band, size_t y) 
 template <typename Sum>
 std::vector<Sum> prepare_black(RowBand<Sum>& loaded, const Band& band, const Image& black, float white) {
     std::vector<Sum> level(band.samples());
-    loaded.black_rest.resize(band.samples());
-    loaded.white.resize(band.samples());
     for (size_t p = 0; p < band.samples(); ++p) {
         const float counts = black.data[(band.first_pixel() + p) * size_t(band.channels) + size_t(band.channel)];
         level[p] = std::is_same_v<Sum, int32_t> ? Sum(std::round(counts)) : Sum(counts);
@@ -56,7 +54,7 @@ void load_frame(const Frame& frame, const Band& band, const std::vector<Sum>& bl
 // The mean of several frames, of the samples that none of them has masked.
 template <typename Sum>
 void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Band& band, const std::vector<Sum>& black,
-               bool clipped_stay, std::vector<Sum, PlaneAllocator<Sum>>& out, std::vector<uint8_t>& masked) {
+               bool clipped_stay, std::span<Sum> out, std::vector<uint8_t>& masked) {
     std::vector<float> sums(band.samples()), counts(band.samples());
     for (const auto& frame : frames) {
         load_frame(*frame, band, black, clipped_stay, out.data(), masked.data());
@@ -77,36 +75,41 @@ void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Ba
 
 }  // namespace
 
+// Rows begin on cache lines, an odd number of these apart: were they a multiple of 4 KB apart, the same samples of all rows
+// would contend for one set of the nearest cache.
 template <typename Sum>
-std::vector<Sum*> RowBand<Sum>::pointers() {
-    std::vector<Sum*> all;
-    for (auto& row : rows) all.push_back(row.data());
-    return all;
-}
+RowBand<Sum>::RowBand(size_t rows, size_t samples)
+    : masked(samples),
+      black_rest(samples),
+      white(samples),
+      rows_(rows),
+      pitch_([&] {
+          constexpr size_t line = 64 / sizeof(Sum);
+          return ((samples + line - 1) / line | 1) * line;
+      }()),
+      samples_(rows * pitch_) {}
 
 template <typename Sum>
 RowBand<Sum> RecordedRows<Sum>::load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const {
-    RowBand<Sum> loaded;
-    loaded.rows.resize(rows.size());
-    for (auto& row : loaded.rows) row.resize(band.samples());
-    loaded.masked.assign(band.samples(), 0);
+    RowBand<Sum> loaded(rows.size(), band.samples());
     const auto level = prepare_black(loaded, band, black, like.white);
     for (size_t row = 0; row < rows.size(); ++row) {
+        Sum* const out = loaded.row(row);
         if (rows[row].empty()) {
-            std::fill(loaded.rows[row].begin(), loaded.rows[row].end(), masked_sample<Sum>);
+            std::fill_n(out, band.samples(), masked_sample<Sum>);
             for (uint8_t& mark : loaded.masked) mark |= mask_missing;
         } else if (rows[row].size() == 1) {
-            load_frame(*rows[row][0], band, level, clipped_stay, loaded.rows[row].data(), loaded.masked.data());
+            load_frame(*rows[row][0], band, level, clipped_stay, out, loaded.masked.data());
         } else {
-            load_mean(rows[row], band, level, clipped_stay, loaded.rows[row], loaded.masked);
+            load_mean(rows[row], band, level, clipped_stay, {out, band.samples()}, loaded.masked);
         }
     }
     return loaded;
 }
 
-template struct RowBand<int16_t>;
-template struct RowBand<int32_t>;
-template struct RowBand<float>;
+template class RowBand<int16_t>;
+template class RowBand<int32_t>;
+template class RowBand<float>;
 template struct RecordedRows<int32_t>;
 template struct RecordedRows<float>;
 

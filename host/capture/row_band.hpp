@@ -25,17 +25,26 @@ struct Band {
     size_t first_pixel() const { return first_row * width; }
 };
 
-// Sum: int32_t for frames of counts, float for frames of floats.
+// Sum: int16_t or int32_t for frames of counts, float for frames of floats.
 template <typename Sum>
-struct RowBand {
-    std::vector<std::vector<Sum, PlaneAllocator<Sum>>>
-        rows;  // [basis row][sample], counts above black; masked_sample<Sum> where there is none
+class RowBand {
+  public:
+    // Values are not set but for `masked`, which is 0.
+    RowBand(size_t rows, size_t samples);
+
+    size_t rows() const { return rows_; }
+    // Counts above black; masked_sample<Sum> where there is none.
+    Sum* row(size_t r) { return samples_.data() + r * pitch_; }
+    const Sum* row(size_t r) const { return samples_.data() + r * pitch_; }
+
     // Of each sample: MaskBit of what was left out of it, in any row (mask_saturated, mask_missing); 0 where all is there.
     std::vector<uint8_t> masked;
     std::vector<float> black_rest;  // of each sample: what is left of the black level in every row, |rest| <= 0.5
     std::vector<float> white;       // of each sample: the count above black at which it saturates
 
-    std::vector<Sum*> pointers();
+  private:
+    size_t rows_, pitch_;
+    std::vector<Sum, PlaneAllocator<Sum>> samples_;
 };
 
 // The rows of a basis as they were recorded: the mean of each row's frames, rounded to whole counts for int32_t, without

@@ -14,6 +14,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -108,14 +109,13 @@ struct InverseMatrix {
 // All rows of up to block_samples samples, inverted.
 template <typename Real>
 struct Block {
-    std::vector<Real> rows, images;
-
-    explicit Block(const Basis& basis)
-        : rows(size_t(basis.rows) * block_samples), images(size_t(basis.images()) * block_samples) {}
+    std::vector<Real> rows, images;  // empty until first used
 
     template <typename Sample>
     void invert(const Basis& basis, const std::vector<Real>& matrix, const std::vector<const Sample*>& from,
                 size_t count) {
+        rows.resize(size_t(basis.rows) * block_samples);
+        images.resize(size_t(basis.images()) * block_samples);
         for (size_t r = 0; r < from.size(); ++r) std::copy_n(from[r], count, rows.data() + r * block_samples);
         const auto product = [&](auto gemm) {
             gemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, basis.images(), int(block_samples), basis.rows, 1,
@@ -197,13 +197,7 @@ class MatrixWorker {
   public:
     MatrixWorker(const Basis& basis, const InverseMatrix& matrix, std::span<float* const> lamps,
                  std::span<const float> factors)
-        : basis_(basis),
-          matrix_(matrix),
-          lamps_(lamps),
-          factors_(factors),
-          one_row_each_(is_one_image_a_row(basis)),
-          small_(basis),
-          large_(basis) {}
+        : basis_(basis), matrix_(matrix), lamps_(lamps), factors_(factors), one_row_each_(is_one_image_a_row(basis)) {}
 
     template <typename Sample>
     void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
@@ -211,12 +205,19 @@ class MatrixWorker {
         bool fits_float = false;
         if constexpr (std::is_same_v<Sample, int32_t>) fits_float = largest_count(rows, count) < matrix_.counts_limit;
         if (fits_float)
-            small_.invert(basis_, matrix_.floats, rows, count), store(small_.images, begin, count);
+            multiply(small_, matrix_.floats, rows, begin, count);
         else
-            large_.invert(basis_, matrix_.doubles, rows, count), store(large_.images, begin, count);
+            multiply(large_, matrix_.doubles, rows, begin, count);
     }
 
   private:
+    template <typename Real, typename Sample>
+    void multiply(Block<Real>& block, const std::vector<Real>& matrix, const std::vector<const Sample*>& rows,
+                  size_t begin, size_t count) {
+        block.invert(basis_, matrix, rows, count);
+        store(block.images, begin, count);
+    }
+
     template <typename Sample>
     void scale(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
         for (size_t i = 0; i < lamps_.size(); ++i)
@@ -242,10 +243,8 @@ class MatrixWorker {
 };
 
 template <typename Sample>
-void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> rows, size_t samples,
-                           std::span<float* const> lamps, const DemultiplexOptions& options) {
-    openblas_set_num_threads(1);  // blocks are what runs in parallel
-    const InverseMatrix matrix(basis);
+void demultiplex_by_matrix(const InverseMatrix& matrix, const Basis& basis, std::span<const Sample* const> rows,
+                           size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
     const auto at = [&](size_t begin) {
         std::vector<const Sample*> from;
@@ -266,38 +265,47 @@ void demultiplex_by_matrix(const Basis& basis, std::span<const Sample* const> ro
     });
 }
 
-template <typename Count>
-void demultiplex_counts(const Basis& basis, std::span<const Count* const> rows, size_t samples,
-                        std::span<float* const> lamps, const DemultiplexOptions& options) {
-    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
-    assert(options.gain.empty() || options.gain.size() == samples);
-    if (const auto made = plan_for(basis))
-        demultiplex_by_plan(*made, basis, rows, samples, lamps, options);
-    else
-        demultiplex_by_matrix(basis, rows, samples, lamps, options);
-}
-
 }  // namespace
 
-void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
-                 std::span<float* const> lamps, const DemultiplexOptions& options) {
-    demultiplex_counts(basis, rows, samples, lamps, options);
+struct Demultiplexer::Ready {
+    const Basis& basis;
+    std::shared_ptr<const LaidOutPlan> plan;
+    std::once_flag matrix_made;
+    std::optional<InverseMatrix> matrix;
+
+    template <typename Sample>
+    void invert(std::span<const Sample* const> rows, size_t samples, std::span<float* const> lamps,
+                const DemultiplexOptions& options) {
+        assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images());
+        assert(options.gain.empty() || options.gain.size() == samples);
+        if constexpr (!std::is_same_v<Sample, float>)
+            if (plan) return demultiplex_by_plan(*plan, basis, rows, samples, lamps, options);
+        std::call_once(matrix_made, [&] {
+            openblas_set_num_threads(1);  // blocks are what runs in parallel
+            matrix.emplace(basis);
+        });
+        demultiplex_by_matrix(*matrix, basis, rows, samples, lamps, options);
+    }
+};
+
+Demultiplexer::Demultiplexer(const Basis& basis) : ready_(new Ready{basis, plan_for(basis), {}, {}}) {}
+
+Demultiplexer::~Demultiplexer() = default;
+
+void Demultiplexer::invert(std::span<const int32_t* const> rows, size_t samples, std::span<float* const> lamps,
+                           const DemultiplexOptions& options) const {
+    ready_->invert(rows, samples, lamps, options);
 }
 
-void demultiplex(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
-                 std::span<float* const> lamps, const DemultiplexOptions& options) {
-    demultiplex_counts(basis, rows, samples, lamps, options);
+void Demultiplexer::invert(std::span<const int16_t* const> rows, size_t samples, std::span<float* const> lamps,
+                           const DemultiplexOptions& options) const {
+    ready_->invert(rows, samples, lamps, options);
 }
 
-void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
-                 const DemultiplexOptions& options) {
-    assert(int(rows.size()) == basis.rows && int(lamps.size()) == basis.images() && !options.filler);
-    demultiplex_by_matrix(basis, rows, samples, lamps, options);
-}
-
-void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out) {
-    for (const uint32_t* row : rows)
-        for (size_t p = 0; p < samples; ++p) out[p] |= row[p];
+void Demultiplexer::invert(std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
+                           const DemultiplexOptions& options) const {
+    assert(!options.filler);
+    ready_->invert(rows, samples, lamps, options);
 }
 
 }  // namespace ols

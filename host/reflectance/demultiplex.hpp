@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "reflectance/masked_sample.hpp"
@@ -21,25 +22,45 @@ struct DemultiplexOptions {
     const SampleFiller* filler = nullptr;
 };
 
-// lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
-// `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact when
-// |counts| < 2^23, which suits every camera of up to 16 bits. A basis without
-// integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
-void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
-                 std::span<float* const> lamps, const DemultiplexOptions& options = {});
+// A basis made ready to be inverted, for who does it band after band. From any number of threads.
+class Demultiplexer {
+  public:
+    explicit Demultiplexer(const Basis& basis);  // which must outlive it
+    ~Demultiplexer();
 
-// The same bits from 16-bit rows, as a camera or the warp makes them: by a plan in less time, for nothing is narrowed. Either way
-// lamps that begin at a multiple of 64 bytes are written past the caches, which takes a quarter of the time of others.
-void demultiplex(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
-                 std::span<float* const> lamps, const DemultiplexOptions& options = {});
+    // lamps[i][p] = float(sum over rows of weight(row, i) * rows[row][p]) * float(basis.scale * gain[p]).
+    // `rows` holds basis.rows pointers and `lamps` basis.images() pointers, each to `samples` values. The sum is exact when
+    // |counts| < 2^23, which suits every camera of up to 16 bits. A basis without
+    // integer weights: float(sum of inverse(row, i) * rows[row][p], in double) * gain[p].
+    void invert(std::span<const int32_t* const> rows, size_t samples, std::span<float* const> lamps,
+                const DemultiplexOptions& options = {}) const;
+    // The same bits from 16-bit rows, as a camera or the warp makes them: by a plan in less time, for nothing is narrowed.
+    // Either way lamps that begin at a multiple of 64 bytes are written past the caches, which takes a quarter of the time
+    // of others.
+    void invert(std::span<const int16_t* const> rows, size_t samples, std::span<float* const> lamps,
+                const DemultiplexOptions& options = {}) const;
+    // The same for sources that do not quantise: sums in double. Here and without integer weights the order of a sum is the
+    // matrix library's, so that the last bits depend on its version and the processor.
+    void invert(std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
+                const DemultiplexOptions& options = {}) const;
 
-// The same for sources that do not quantise: sums in double. Here and without integer weights the order of a sum is the
-// matrix library's, so that the last bits depend on its version and the processor.
-void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples, std::span<float* const> lamps,
-                 const DemultiplexOptions& options = {});
+  private:
+    struct Ready;
+    std::unique_ptr<Ready> ready_;
+};
 
-// out[p] |= rows[row][p] over all rows: every lamp value of a sample rests on all rows of a multiplexed basis, and a
-// target's mask is one value for all lamps.
-void combine_masks(std::span<const uint32_t* const> rows, size_t samples, uint32_t* out);
+// For one call.
+inline void demultiplex(const Basis& basis, std::span<const int32_t* const> rows, size_t samples,
+                        std::span<float* const> lamps, const DemultiplexOptions& options = {}) {
+    Demultiplexer(basis).invert(rows, samples, lamps, options);
+}
+inline void demultiplex(const Basis& basis, std::span<const int16_t* const> rows, size_t samples,
+                        std::span<float* const> lamps, const DemultiplexOptions& options = {}) {
+    Demultiplexer(basis).invert(rows, samples, lamps, options);
+}
+inline void demultiplex(const Basis& basis, std::span<const float* const> rows, size_t samples,
+                        std::span<float* const> lamps, const DemultiplexOptions& options = {}) {
+    Demultiplexer(basis).invert(rows, samples, lamps, options);
+}
 
 }  // namespace ols

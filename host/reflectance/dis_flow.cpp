@@ -80,8 +80,10 @@ void refine(const cv::Mat& from, const cv::Mat& to, const DisFlowOptions& option
     refinement->calcUV(from, to, u, v);
 }
 
-// DIS knows no masks: what is not seen moves as the nearest pixel that is.
+// DIS knows no masks: what is not seen moves as the nearest pixel that is, smoothed, or every pixel of an outline would draw a
+// border of its own through all that lies beyond it.
 void follow_seen(const Image& seen, FlowField& flow) {
+    constexpr double smoothing = 4;  // pixels
     if (seen.data.empty()) return;
     cv::Mat unseen(seen.height, seen.width, CV_8U), distance, nearest;
     for (int y = 0; y < seen.height; ++y)
@@ -90,9 +92,16 @@ void follow_seen(const Image& seen, FlowField& flow) {
     std::vector<size_t> place(flow.size() + 1, flow.size());  // of the seen pixel of each label
     for (size_t p = 0; p < flow.size(); ++p)
         if (unseen.data[p] == 0) place[size_t(nearest.ptr<int>()[p])] = p;
-    for (size_t p = 0; p < flow.size(); ++p) {
-        const size_t from = place[size_t(nearest.ptr<int>()[p])];
-        if (unseen.data[p] != 0 && from < flow.size()) flow.u[p] = flow.u[from], flow.v[p] = flow.v[from];
+    for (std::vector<float>* const plane : {&flow.u, &flow.v}) {
+        std::vector<float> filled = *plane;
+        for (size_t p = 0; p < flow.size(); ++p)
+            if (const size_t from = place[size_t(nearest.ptr<int>()[p])]; from < flow.size())
+                filled[p] = (*plane)[from];
+        cv::Mat smooth;
+        cv::GaussianBlur(cv::Mat(flow.height, flow.width, CV_32F, filled.data()), smooth, {0, 0}, smoothing, smoothing,
+                         cv::BORDER_REPLICATE);
+        for (size_t p = 0; p < flow.size(); ++p)
+            if (unseen.data[p] != 0) (*plane)[p] = smooth.ptr<float>()[p];
     }
 }
 

@@ -77,23 +77,26 @@ Image without_even_parts(const Image& image, const Evenness& evenness) {
 
 std::vector<float> confidence(const FlowField& forward, const FlowField& backward, const Evenness& from,
                               const Evenness& to) {
-    std::vector<float> out = confidence(forward, backward);
     const FlowField round_trip = concatenated(forward, backward);
+    std::vector<float> out = confidence_of(forward, round_trip);
     for (int y = 0; y < forward.height; ++y)
         for (int x = 0; x < forward.width; ++x) {
             const size_t at = size_t(y) * size_t(forward.width) + size_t(x);
+            if (from.reach.data[at] == 0) continue;
             const float tx = float(x) + forward.u[at], ty = float(y) + forward.v[at];
             // What leads outside is held at the edge.
             const float hx = std::clamp(tx, 0.0f, float(forward.width - 1)),
                         hy = std::clamp(ty, 0.0f, float(forward.height - 1));
-            const float miss = std::hypot(round_trip.u[at] + hx - tx, round_trip.v[at] + hy - ty);
-            const int there_x = int(std::lround(hx)), there_y = int(std::lround(hy));
-            const float reach = std::min(from.reach.data[at], to.reach.at(there_x, there_y));
-            if (!(miss <= reach) || reach == 0) continue;
-            const float differ = std::abs(from.mean.data[at] - to.mean.at(there_x, there_y)),
-                        noise = std::hypot(from.noise.data[at], to.noise.at(there_x, there_y));
-            if (differ <= float(significant_difference) * noise)
-                out[at] = std::max(out[at], 1 / (1 + miss * miss / (reach * reach)));
+            const float miss_x = round_trip.u[at] + hx - tx, miss_y = round_trip.v[at] + hy - ty;
+            const float miss2 = miss_x * miss_x + miss_y * miss_y;
+            const int there_x = int(hx + 0.5f), there_y = int(hy + 0.5f);
+            const float reach = std::min(from.reach.data[at], to.reach.at(there_x, there_y)), reach2 = reach * reach;
+            if (!(miss2 <= reach2) || reach == 0) continue;
+            const float differ = from.mean.data[at] - to.mean.at(there_x, there_y);
+            const float noise_here = from.noise.data[at], noise_there = to.noise.at(there_x, there_y);
+            const float noise2 = noise_here * noise_here + noise_there * noise_there;
+            if (differ * differ <= float(significant_difference * significant_difference) * noise2)
+                out[at] = std::max(out[at], 1 / (1 + miss2 / reach2));
         }
     return out;
 }

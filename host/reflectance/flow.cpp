@@ -226,22 +226,4 @@ Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOp
     }
 }
 
-std::vector<float> confidence(const FlowField& forward, const FlowField& backward) {
-    const FlowField round_trip = concatenated(forward, backward);
-    std::vector<float> out(forward.size());
-    for (int y = 0; y < forward.height; ++y)
-        for (int x = 0; x < forward.width; ++x) {
-            const size_t at = size_t(y) * size_t(forward.width) + size_t(x);
-            const float u = forward.u[at], v = forward.v[at], tx = float(x) + u, ty = float(y) + v;
-            const bool inside = tx >= 0 && ty >= 0 && tx <= float(forward.width - 1) && ty <= float(forward.height - 1);
-            if (!inside) continue;
-            const float miss2 = round_trip.u[at] * round_trip.u[at] + round_trip.v[at] * round_trip.v[at];
-            const float back_length = std::hypot(round_trip.u[at] - u, round_trip.v[at] - v);
-            const float allowed = 0.5f + 0.01f * (std::hypot(u, v) + back_length);
-            const float c = 1 / (1 + miss2 / (allowed * allowed));
-            out[at] = std::isfinite(c) ? c : 0.0f;
-        }
-    return out;
-}
-
 }  // namespace ols

@@ -45,5 +45,7 @@ Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOp
 // of `backward` adds). 1: it comes back exactly; 1/2: it misses by as much as is allowed; 0: it leads outside the image, or
 // is no number. Occluded pixels have no counterpart, so they mostly end on what covers them and miss. Fields of one size.
 std::vector<float> confidence(const FlowField& forward, const FlowField& backward);
+// The same for who has their concatenation.
+std::vector<float> confidence_of(const FlowField& forward, const FlowField& round_trip);
 
 }  // namespace ols

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A row at a time: its vectors are sampled from the fields into the nearest cache, lines are laid through runs of eight.
+// A row at a time: its vectors are sampled from the fields into the nearest cache, lines are laid through runs of sixteen.
 #include "reflectance/group_motion.hpp"
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 #define OLS_GROUP_MOTION_TYPES
 namespace ols {
 
-// Pixel `phases * i + j` of a plane lies at i + before + weight of the field's, j < phases; before is -1 or 0.
+// Sample `phases * i + j` of a row lies at i + before + weight of the field's, j < phases; before is -1 or 0.
 struct FieldPhase {
     int before;
     float weight;
@@ -65,22 +65,12 @@ void spread_row(const float* row, const FieldPhase* phases, int phase_count, int
     }
 }
 
-// Every second value; as far beyond the end.
-void thin_row(const float* row, int count, float* out) {
-    const hn::CappedTag<float, 16> d;
-    for (int i = 0; i < count; i += int(hn::Lanes(d))) {
-        auto even = hn::Zero(d), odd = hn::Zero(d);
-        hn::LoadInterleaved2(d, row + 2 * i, even, odd);
-        hn::StoreU(even, d, out + i);
-    }
-}
-
-// The line through the first and the last pixel of each run of one row; whether the others are near it, as a vector component.
-// first_of[run] is the run's first pixel.
+// The line through the first and the last sample of each run of one row; whether the others are near it, as a vector component.
+// first_of[run] is the run's first sample.
 void fit_row(const float* row, const int* first_of, int runs, float tolerance, float* first, float* change,
              uint8_t* is_line) {
-    constexpr int last = GroupMotion::run_pixels - 1;
-    const hn::CappedTag<float, GroupMotion::run_pixels> d;
+    constexpr int last = GroupMotion::run_samples - 1;
+    const hn::CappedTag<float, GroupMotion::run_samples> d;
     const auto most = hn::Set(d, tolerance);
     for (int run = 0; run < runs; ++run) {
         const float* const v = row + first_of[run];
@@ -105,47 +95,43 @@ namespace ols {
 
 HWY_EXPORT(blend_rows);
 HWY_EXPORT(spread_row);
-HWY_EXPORT(thin_row);
 HWY_EXPORT(fit_row);
 
 namespace {
 
-// Rows of a plane, sampled from a component of a flow field at a resolution `enlarged` times lower than the frame's.
+// Rows of a grid, sampled from a component of a flow field at a resolution `enlarged` times lower.
 class RowSampler {
   public:
-    RowSampler(const std::vector<float>& values, int width, int height, const PlaneGrid& grid)
+    RowSampler(const std::vector<float>& values, int width, int height, const SampleGrid& grid)
         : values_(values),
           width_(width),
           height_(height),
           grid_(grid),
-          enlarged_(grid.frame_width / width),
+          enlarged_(grid.width / width),
           blended_(size_t(width + 2 + 2 * vector_slack)),
-          row_(size_t(grid.width() + 4 * vector_slack)) {
-        const int count = std::max(1, enlarged_ / grid.step);
-        for (int j = 0; j < count; ++j) phases_.push_back(phase_at(grid.first_x + grid.step * j));
+          row_(size_t(grid.width + 4 * vector_slack)) {
+        for (int j = 0; j < enlarged_; ++j) phases_.push_back(phase_at(j));
     }
 
     // Lasts until the next call.
     const float* row(int y) {
         if (enlarged_ == 1 && grid_.step == 1) return &values_[size_t(y) * size_t(width_)];
-        const FieldPhase place = phase_at(grid_.first_y + grid_.step * y);
+        const FieldPhase place = phase_at(y);
         blend(place.before, place.weight > 0 ? place.before + 1 : place.before, place.weight);
-        if (enlarged_ < grid_.step)
-            HWY_DYNAMIC_DISPATCH(thin_row)(&blended_[size_t(1 + grid_.first_x)], grid_.width(), row_.data());
-        else
-            HWY_DYNAMIC_DISPATCH(spread_row)
-        (&blended_[1], phases_.data(), int(phases_.size()), grid_.width(), row_.data());
+        if (enlarged_ == 1) return &blended_[1];
+        HWY_DYNAMIC_DISPATCH(spread_row)
+        (&blended_[1], phases_.data(), int(phases_.size()), grid_.width, row_.data());
         return row_.data();
     }
 
   private:
     // Centres of pixels lie half a pixel from their edges, at every resolution.
-    FieldPhase phase_at(int frame_pixel) const {
-        const double place = (frame_pixel + 0.5) / enlarged_ - 0.5, whole = std::floor(place);
+    FieldPhase phase_at(int sample) const {
+        const double place = (sample + 0.5) / enlarged_ - 0.5, whole = std::floor(place);
         return {int(whole), float(place - whole)};
     }
 
-    // Field rows a and b (edges held) to blended_, from 1, in the plane's pixels.
+    // Field rows a and b (edges held) to blended_, from 1, in steps of the grid.
     void blend(int a, int b, float weight) {
         const auto at = [&](int y) { return &values_[size_t(std::clamp(y, 0, height_ - 1)) * size_t(width_)]; };
         HWY_DYNAMIC_DISPATCH(blend_rows)
@@ -156,57 +142,56 @@ class RowSampler {
 
     const std::vector<float>& values_;
     int width_, height_;
-    PlaneGrid grid_;
+    SampleGrid grid_;
     int enlarged_;
     std::vector<FieldPhase> phases_;
     std::vector<float> blended_, row_;
 };
 
-bool is_sampled_by_row(const FlowField& flow, const PlaneGrid& grid) {
+bool is_sampled_by_row(const FlowField& flow, const SampleGrid& grid) {
     for (const int enlarged : {1, 2, 4})
-        if (flow.width * enlarged == grid.frame_width && flow.height * enlarged == grid.frame_height) return true;
+        if (flow.width * enlarged == grid.width && flow.height * enlarged == grid.height) return true;
     return false;
 }
 
 }  // namespace
 
-GroupMotion::GroupMotion(const FlowField& base, const FlowField& step, float tolerance_px)
-    : GroupMotion(base, step, {base.width, base.height}, tolerance_px) {}
+GroupMotion::GroupMotion(const FlowField& base, const FlowField& step, float tolerance_steps)
+    : GroupMotion(base, step, {base.width, base.height}, tolerance_steps) {}
 
-GroupMotion::GroupMotion(const FlowField& base, const FlowField& step, const PlaneGrid& grid, float tolerance_px)
-    : width_(grid.width()), height_(grid.height()), runs_((width_ + run_pixels - 1) / run_pixels) {
-    assert(base.width == step.width && base.height == step.height && width_ > 0 && height_ > 0);
+GroupMotion::GroupMotion(const FlowField& base, const FlowField& step, const SampleGrid& grid, float tolerance_steps)
+    : grid_(grid), runs_((grid.width + run_samples - 1) / run_samples) {
+    assert(base.width == step.width && base.height == step.height && grid.width > 0 && grid.height > 0);
     assert(grid.step == 1 || grid.step == 2);
     if (is_sampled_by_row(base, grid))
-        make(base, step, grid, tolerance_px);
+        make(base, step, tolerance_steps);
     else
-        make(resized(base, grid.frame_width, grid.frame_height), resized(step, grid.frame_width, grid.frame_height),
-             grid, tolerance_px);
+        make(resized(base, grid.width, grid.height), resized(step, grid.width, grid.height), tolerance_steps);
 }
 
-void GroupMotion::make(const FlowField& base, const FlowField& step, const PlaneGrid& grid, float tolerance_px) {
-    const size_t count = size_t(runs_) * size_t(height_);
+void GroupMotion::make(const FlowField& base, const FlowField& step, float tolerance_steps) {
+    const size_t count = size_t(runs_) * size_t(grid_.height);
     std::vector<float>* const firsts[] = {&lines_.base_u, &lines_.base_v, &lines_.step_u, &lines_.step_v};
     std::vector<float>* const changes[] = {&lines_.base_du, &lines_.base_dv, &lines_.step_du, &lines_.step_dv};
     for (auto* list : firsts) list->assign(count + vector_slack, std::numeric_limits<float>::quiet_NaN());
     for (auto* list : changes) list->assign(count + vector_slack, 0);
     own_index_.assign(count, -1);
-    RowSampler samplers[] = {{base.u, base.width, base.height, grid},
-                             {base.v, base.width, base.height, grid},
-                             {step.u, step.width, step.height, grid},
-                             {step.v, step.width, step.height, grid}};
+    RowSampler samplers[] = {{base.u, base.width, base.height, grid_},
+                             {base.v, base.width, base.height, grid_},
+                             {step.u, step.width, step.height, grid_},
+                             {step.v, step.width, step.height, grid_}};
     std::vector<int> first;
     for (int run = 0; run < runs_; ++run) first.push_back(first_of(run));
-    const bool has_lines = tolerance_px > 0 && width_ >= run_pixels;
+    const bool has_lines = tolerance_steps > 0 && grid_.width >= run_samples;
     std::vector<uint8_t> is_line(first.size());
-    for (int y = 0; y < height_; ++y) {
+    for (int y = 0; y < grid_.height; ++y) {
         std::fill(is_line.begin(), is_line.end(), uint8_t(has_lines));
         const float* rows[4];
         const size_t at = size_t(y) * size_t(runs_);
         for (size_t k = 0; k < 4; ++k) {
             rows[k] = samplers[k].row(y);
             if (has_lines) HWY_DYNAMIC_DISPATCH(fit_row)
-            (rows[k], first.data(), runs_, tolerance_px / 2, &(*firsts[k])[at], &(*changes[k])[at], is_line.data());
+            (rows[k], first.data(), runs_, tolerance_steps / 2, &(*firsts[k])[at], &(*changes[k])[at], is_line.data());
         }
         keep_own(rows, y, is_line);
     }
@@ -220,7 +205,7 @@ void GroupMotion::keep_own(const float* const (&rows)[4], int y, const std::vect
         own_index_[at] = int32_t(own_.size());
         OwnVectors& own = own_.emplace_back();
         for (size_t k = 0; k < 4; ++k)
-            for (int i = 0; i < run_pixels; ++i) own.of[k][i] = rows[k][std::min(first_of(run) + i, width_ - 1)];
+            for (int i = 0; i < run_samples; ++i) own.of[k][i] = rows[k][std::min(first_of(run) + i, grid_.width - 1)];
     }
 }
 
@@ -228,7 +213,7 @@ double GroupMotion::linear_share() const {
     return own_index_.empty() ? 0 : 1 - double(own_.size()) / double(own_index_.size());
 }
 
-void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) const {
+void GroupMotion::vectors(int y, float fraction, float* u_out, float* v_out) const {
     for (int run = 0; run < runs_; ++run) {
         const size_t at = size_t(y) * size_t(runs_) + size_t(run);
         const auto component = [&](const std::vector<float>& base, const std::vector<float>& step) {
@@ -237,10 +222,10 @@ void GroupMotion::positions(int y, float fraction, float* x_out, float* y_out) c
         const float u = component(lines_.base_u, lines_.step_u), du = component(lines_.base_du, lines_.step_du);
         const float v = component(lines_.base_v, lines_.step_v), dv = component(lines_.base_dv, lines_.step_dv);
         const OwnVectors* const own = own_vectors(run, y);
-        for (int k = 0; k < std::min(run_pixels, width_); ++k) {
+        for (int k = 0; k < std::min(run_samples, grid_.width); ++k) {
             const int x = first_of(run) + k;
-            x_out[x] = float(x) + (own ? own->of[0][k] + fraction * own->of[2][k] : u + float(k) * du);
-            y_out[x] = float(y) + (own ? own->of[1][k] + fraction * own->of[3][k] : v + float(k) * dv);
+            u_out[x] = own ? own->of[0][k] + fraction * own->of[2][k] : u + float(k) * du;
+            v_out[x] = own ? own->of[1][k] + fraction * own->of[3][k] : v + float(k) * dv;
         }
     }
 }

@@ -20,15 +20,34 @@ Image shrunk(const Image& image, int reduction) {
     if (reduction == 1) return image;
     const auto part = [&](int side) { return (side + reduction - 1) / reduction; };
     Image out(part(image.width), part(image.height), 1);
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x) {
-            float sum = 0, count = 0;
-            for (int j = y * reduction; j < std::min((y + 1) * reduction, image.height); ++j)
-                for (int i = x * reduction; i < std::min((x + 1) * reduction, image.width); ++i)
-                    if (const float v = image.at(i, j); std::isfinite(v)) sum += v, ++count;
-            out.at(x, y) = count > 0 ? sum / count : std::numeric_limits<float>::quiet_NaN();
+    std::vector<float> sums(size_t(out.width * reduction)), counts(sums.size());
+    for (int y = 0; y < out.height; ++y) {
+        std::ranges::fill(sums, 0.0f);
+        std::ranges::fill(counts, 0.0f);
+        for (int j = y * reduction; j < std::min((y + 1) * reduction, image.height); ++j) {
+            const float* const row = &image.data[size_t(j) * size_t(image.width)];
+            for (size_t i = 0; i < size_t(image.width); ++i) {
+                const bool is_number = std::abs(row[i]) <= std::numeric_limits<float>::max();
+                sums[i] += is_number ? row[i] : 0.0f;
+                counts[i] += is_number ? 1.0f : 0.0f;
+            }
         }
+        for (size_t x = 0; x < size_t(out.width); ++x) {
+            float sum = 0, count = 0;
+            for (size_t i = x * size_t(reduction); i < (x + 1) * size_t(reduction); ++i)
+                sum += sums[i], count += counts[i];
+            out.data[size_t(y) * size_t(out.width) + x] =
+                count > 0 ? sum / count : std::numeric_limits<float>::quiet_NaN();
+        }
+    }
     return out;
+}
+
+int reduction_of(const Image& image, int reduced_side) {
+    int reduction = 1;
+    while (reduced_side > 0 && reduction < 4 && std::min(image.width, image.height) >= 2 * reduction * reduced_side)
+        reduction *= 2;
+    return reduction;
 }
 
 FlowField scaled(const FlowField& flow, double factor) {
@@ -66,24 +85,22 @@ SplitFlow split(const FlowField& between, double share) {
     return {back, scaled(back, -(1 - share) / share)};
 }
 
-TrackingFlows::TrackingFlows(TrackingFlowOptions options) : options_(std::move(options)) {
-    assert(options_.reduction == 1 || options_.reduction == 2 || options_.reduction == 4);
-}
+TrackingFlows::TrackingFlows(TrackingFlowOptions options) : options_(std::move(options)) {}
 
 Status TrackingFlows::add(double tick, const Image& image, const Image& sigma) {
     assert(image.channels == 1 && (frames_.empty() || tick > frames_.back().tick));
-    Image small = shrunk(image, options_.reduction);
+    if (frames_.empty()) reduction_ = reduction_of(image, options_.reduced_side);
+    Image small = shrunk(image, reduction_);
     if (frames_.empty()) width_ = small.width, height_ = small.height;
     if (small.width != width_ || small.height != height_) return fail("tracking frames differ in size");
     if (std::min(width_, height_) < 16)
         return fail("frames of " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                    " pixels are too small for motion compensation: at least " +
-                    std::to_string(16 * options_.reduction) + " a side");
+                    " pixels are too small for motion compensation: at least 16 a side");
     Frame frame{tick, std::move(small), {}, {}, {}};
     if (!sigma.data.empty()) {
         assert(sigma.width == image.width && sigma.height == image.height);
-        Image noise = shrunk(sigma, options_.reduction);
-        for (float& v : noise.data) v /= float(options_.reduction);  // of a mean over reduction^2 pixels
+        Image noise = shrunk(sigma, reduction_);
+        for (float& v : noise.data) v /= float(reduction_);  // of a mean over reduction^2 pixels
         frame.evenness = evenness_of(frame.image, noise);
         frame.image = without_even_parts(frame.image, *frame.evenness);
     }

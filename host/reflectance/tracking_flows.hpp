@@ -18,11 +18,13 @@ struct TrackingFlowOptions {
     // Of a long-range flow, which a concatenation begins: directly between the target's tracking frame and one that is
     // farther away. Nothing: concatenations stand as they are.
     std::optional<FlowOptions> refinement;
-    int reduction = 1;  // 1, 2, 4: flow is found in images of this fraction of their size
-    int threads = 0;    // 0: as many as there are processors. Any number gives the same bits.
+    // Flow is found in images a half or a quarter as large, while their shorter side keeps this many pixels; 0: in images as they
+    // are.
+    int reduced_side = 0;
+    int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
 };
 
-// A flow from an instant to another one. Fields have the size of the images divided by `reduction`, rounded up, and vectors
+// A flow from an instant to another one. Fields have the size of the images that flow is found in, rounded up, and vectors
 // are in their pixels.
 struct MotionKnot {
     double tick = 0;
@@ -41,7 +43,7 @@ class TrackingFlows {
   public:
     explicit TrackingFlows(TrackingFlowOptions options);
 
-    // One channel, all of one size, at least 16 * reduction pixels a side, NaN where nothing was seen. Ticks ascend. `sigma`: the
+    // One channel, all of one size, at least 16 pixels a side, NaN where nothing was seen. Ticks ascend. `sigma`: the
     // standard deviation of each pixel's noise, the same size; what shows nothing above it is left to its surroundings.
     // Empty: not known.
     // Error: another size than before, or too small.
@@ -70,7 +72,7 @@ class TrackingFlows {
                 MotionPath& path) const;
 
     const TrackingFlowOptions options_;
-    int width_ = 0, height_ = 0;
+    int reduction_ = 1, width_ = 0, height_ = 0;  // of the images that flow is found in
     std::deque<Frame> frames_;
 };
 

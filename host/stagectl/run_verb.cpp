@@ -88,15 +88,19 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);
     if (report.saturated_share > 0)
+        fmt::print(stderr,
+                   "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
+                   "for them: "
+                   "shorten the exposure\n",
+                   report.saturated_share * 100);
+    if (report.unsolved_share > 0)
         fmt::print(
             stderr,
-            "stagectl: {:.2g} % of the pixels have saturated samples, which are left out: shorten the exposure\n",
-            report.saturated_share * 100);
-    if (report.unsolved_share > 0)
-        fmt::print(stderr,
-                   "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: --estimate "
-                   "clipped counts saturated ones as they were read, smooth or nonnegative estimate lost ones too\n",
-                   report.unsolved_share * 100);
+            "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: {}--estimate smooth or "
+            "nonnegative estimate lost ones{}\n",
+            report.unsolved_share * 100,
+            options.estimate == "clipped" ? "" : "--estimate clipped counts saturated ones as they were read, ",
+            options.estimate == "clipped" ? "" : " too");
     if (report.misaligned_share > 0)
         fmt::print(stderr,
                    "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "capture/color_planes.hpp"
+#include "capture/tracking_image.hpp"
 #include "true_flow.hpp"
 
 namespace ols {
@@ -30,10 +30,6 @@ std::vector<const float*> pointers(const Images& images) {
     std::vector<const float*> out;
     for (const auto& image : images) out.push_back(image.data());
     return out;
-}
-
-double middle_tick(const Frame& frame) {
-    return double(frame.tick) + 0.5 * double(frame.exposure_ticks);
 }
 
 // Gives pixels without a flow that of the nearest pixel that has one.

@@ -18,7 +18,7 @@ using namespace ols;
 
 namespace {
 
-constexpr int width = 46, height = 34;  // no multiple of eight
+constexpr int width = 46, height = 34;  // no multiple of sixteen
 constexpr float black_counts = 64.25f;
 
 template <typename Sample>
@@ -63,13 +63,13 @@ std::vector<std::vector<Sum>> aligned(const std::shared_ptr<Frame>& frame, const
     AlignedRows<Sample, Sum> rows;
     rows.alignment = std::make_shared<Alignment>(path, width, height, frame->cfa, 0.02f, 1);
     const auto dark = black_planes<Sample>(black, frame->cfa, frame->format);
-    rows.rows = {{{std::make_shared<ColorPlanes<Sample>>(color_planes(*frame, dark)), rows.alignment->place_of(tick)}}};
-    rows.threads = 1;
+    rows.rows = {
+        {{std::make_shared<SignalPlanes<Sample>>(signal_planes(*frame, dark, false)), rows.alignment->place_of(tick)}}};
     std::vector<std::vector<Sum>> out;
     for (int channel = 0; channel < samples_per_pixel(frame->cfa); ++channel) {
         const Band band{0, height, width, channel, samples_per_pixel(frame->cfa)};
-        const auto loaded = rows.load(band, *frame, black, false).rows[0];
-        out.emplace_back(loaded.begin(), loaded.end());
+        const auto loaded = rows.load(band, *frame, black, false);
+        out.emplace_back(loaded.row(0), loaded.row(0) + band.samples());
     }
     return out;
 }

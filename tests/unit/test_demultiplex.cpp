@@ -177,14 +177,6 @@ TEST_P(Demultiplex, estimated_variance_is_the_variance_of_many_noisy_inversions)
     EXPECT_NEAR(variance / mean_estimate, 1, 0.03);
 }
 
-TEST(DemultiplexMasks, one_bad_row_marks_its_sample_only) {
-    std::vector<std::vector<uint32_t>> rows(159, std::vector<uint32_t>(10));
-    rows[80][3] = 1, rows[5][3] = 2, rows[158][9] = 4;
-    std::vector<uint32_t> mask(10);
-    combine_masks(pointers(rows), 10, mask.data());
-    EXPECT_EQ(mask, (std::vector<uint32_t>{0, 0, 0, 3, 0, 0, 0, 0, 0, 4}));
-}
-
 // What breaks a multiplexed inversion: one saturated row spreads over all lamps, which is why masks travel.
 TEST(DemultiplexMasks, a_clipped_row_disturbs_every_lamp) {
     const Basis basis = *find_basis("s159");

@@ -2,8 +2,10 @@
 // Samples that follow the brightness of the tracking frames: the factor's closed form, and what must not move.
 // links: ols_capture
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <cmath>
+#include <random>
 
 #include "capture/followed_brightness.hpp"
 #include "reflectance/masked_sample.hpp"
@@ -12,18 +14,24 @@ using namespace ols;
 
 namespace {
 
-template <typename Sum>
-using Plane = std::vector<Sum, PlaneAllocator<Sum>>;
-
 const NoiseModel noise;
+
+// Bands of one sample.
+template <typename Sum>
+RowBand<Sum> band_of(std::initializer_list<Sum> rows) {
+    RowBand<Sum> band(rows.size(), 1);
+    size_t row = 0;
+    for (const Sum sample : rows) band.row(row++)[0] = sample;
+    return band;
+}
 
 // Three knots, the target's in the middle.
 template <typename Sum>
 Sum followed(Sum before, Sum now, Sum after, Alignment::Place place, Sum sample) {
-    const FollowedBrightness brightness(FollowedBrightness::Knots<Sum>{{before}, {now}, {after}}, 1, noise);
-    Plane<Sum> samples{sample};
-    brightness.apply(place, std::span<Sum>(samples));
-    return samples[0];
+    const FollowedBrightness<Sum> brightness(band_of<Sum>({before, now, after}), {1, 1, 1}, 1, noise);
+    RowBand<Sum> samples = band_of<Sum>({sample});
+    brightness.apply(place, samples, 0);
+    return samples.row(0)[0];
 }
 
 }  // namespace
@@ -77,4 +85,66 @@ TEST(FollowedBrightness, of_another_surface_gives_the_sum_its_right_size_and_kee
         sum += out;
     }
     EXPECT_FLOAT_EQ(sum, all_second);
+}
+
+// Every path, every kind of change, in a band that ends within a block.
+TEST(FollowedBrightness, gives_the_same_bits_on_every_path_and_leaves_its_neighbours) {
+    constexpr size_t samples = 203;
+    std::mt19937 random(4);
+    RowBand<int16_t> knots(4, samples), slot(1, samples);
+    for (size_t p = 0; p < samples; ++p) {
+        for (size_t k = 0; k < 4; ++k) knots.row(k)[p] = int16_t(random() % 4200 - 100);
+        if (p % 17 == 0) knots.row(p % 4)[p] = masked_sample<int16_t>;
+        slot.row(0)[p] = p % 23 == 0 ? masked_sample<int16_t> : int16_t(random() % 4200 - 100);
+    }
+    const FollowedBrightness<int16_t> brightness(knots, {1, 1, 1, 1}, 1, noise);
+    std::vector<std::vector<int16_t>> results;
+    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        RowBand<int16_t> out = slot;
+        brightness.apply({2, 0.3f}, out, 0);
+        results.emplace_back(out.row(0), out.row(0) + samples);
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    ASSERT_GT(results.size(), 1u);
+    for (const auto& result : results) EXPECT_EQ(result, results[0]);
+    for (size_t p = 0; p < samples; ++p) {
+        RowBand<int16_t> alone(4, 1);
+        for (size_t k = 0; k < 4; ++k) alone.row(k)[0] = knots.row(k)[p];
+        RowBand<int16_t> one(1, 1);
+        one.row(0)[0] = slot.row(0)[p];
+        FollowedBrightness<int16_t>(alone, {1, 1, 1, 1}, 1, noise).apply({2, 0.3f}, one, 0);
+        EXPECT_EQ(results[0][p], one.row(0)[0]) << p;
+    }
+}
+
+// Lamps that are brighter by a third in a tracking slot say nothing of the subject.
+TEST(FollowedBrightness, takes_light_that_all_pixels_have_more_of_for_the_lamps) {
+    constexpr size_t samples = 400;
+    std::mt19937 random(6);
+    std::vector<RowBand<int16_t>> bands{{2, samples}};
+    for (size_t p = 0; p < samples; ++p) {
+        const int now = 300 + int(random() % 2700);
+        bands[0].row(0)[p] = int16_t(std::lround(now * 4 / 3.0));
+        bands[0].row(1)[p] = int16_t(now);
+    }
+    for (size_t p = 0; p < samples; p += 9) bands[0].row(0)[p] /= 2;  // some that the subject left
+    const std::vector<float> light = relative_light<int16_t>(bands, 1, noise);
+    EXPECT_NEAR(light[0], 4 / 3.0, 0.002);
+    EXPECT_EQ(light[1], 1);
+    RowBand<int16_t> slot(1, samples);
+    std::fill_n(slot.row(0), samples, int16_t(500));
+    const FollowedBrightness<int16_t> brightness(bands[0], light, 1, noise);
+    brightness.apply({0, 0.0f}, slot, 0);
+    for (size_t p = 0; p < samples; ++p) {
+        const bool is_dark = bands[0].row(1)[p] * 0.5 <
+                             6 * M_SQRT2 * (noise.read_counts + noise.shot * std::sqrt(double(bands[0].row(1)[p])));
+        EXPECT_NEAR(slot.row(0)[p], p % 9 || is_dark ? 500 : 1000, 3) << p;
+    }
+}
+
+TEST(RelativeLight, of_a_dark_frame_is_one) {
+    std::vector<RowBand<float>> bands{{3, 500}};
+    for (size_t k = 0; k < 3; ++k) std::fill_n(bands[0].row(k), 500, float(k));
+    EXPECT_EQ(relative_light<float>(bands, 1, noise), (std::vector<float>{1, 1, 1}));
 }

@@ -28,7 +28,7 @@ Image at_tick(double tick) {
 }
 
 TrackingFlowOptions options(bool refines = true, int threads = 1) {
-    TrackingFlowOptions made{.local = *flow_method("brox"), .refinement = {}, .reduction = 1, .threads = threads};
+    TrackingFlowOptions made{.local = *flow_method("brox"), .refinement = {}, .threads = threads};
     if (refines) made.refinement = *flow_method("refine");
     return made;
 }
@@ -129,7 +129,7 @@ TEST(TrackingFlows, give_the_same_whether_frames_before_were_forgotten) {
 
 TEST(TrackingFlows, of_reduced_images_are_in_their_pixels) {
     TrackingFlowOptions half = options();
-    half.reduction = 2;
+    half.reduced_side = height / 2;
     TrackingFlows flows = flows_of({0, 1, 2}, half);
     const MotionPath path = *flows.path(1000, 0, 2000);
     EXPECT_EQ(path[2].flow.width, width / 2);

@@ -27,7 +27,8 @@ struct Scene {
     FlowField base, step;
     float fraction = 0.3f;
     int largest = 4095;
-    float tolerance_px = 0;
+    float tolerance_steps = 0;
+    int step_px = 1;  // of the grid
 
     Scene(int w, int h, int most = 4095)
         : width(w), height(h), counts(size_t(w) * size_t(h)), base(w, h), step(w, h), largest(most) {
@@ -48,23 +49,31 @@ struct Scene {
     }
     std::vector<int16_t> warped() const {
         std::vector<int16_t> out(counts.size());
-        warp_counts({counts.data(), width, height, size_t(width), largest}, GroupMotion(base, step, tolerance_px),
-                    fraction, out.data(), size_t(width));
+        warp_counts({counts.data(), grid(), size_t(width), largest}, motion(), fraction, out.data(), size_t(width));
         return out;
     }
-    // By definition; NaN where it must be masked.
+    SampleGrid grid() const { return {width, height, step_px}; }
+    GroupMotion motion() const { return {base, step, grid(), tolerance_steps}; }
+    // By definition, among the samples of the same colour; NaN where it must be masked.
     double truth(int x, int y) const {
         const size_t p = size_t(y) * size_t(width) + size_t(x);
-        const double px = float(x) + (base.u[p] + fraction * step.u[p]),
-                     py = float(y) + (base.v[p] + fraction * step.v[p]);
-        if (!(px >= 0 && py >= 0 && px <= width - 1 && py <= height - 1)) return NAN;
+        const int color_x = x % step_px, color_y = y % step_px;
+        const int columns = (width - color_x + step_px - 1) / step_px,
+                  rows = (height - color_y + step_px - 1) / step_px;
+        const auto vector = [&](float from, float change) {
+            return from / float(step_px) + fraction * (change / float(step_px));
+        };
+        const double px = float(x / step_px) + vector(base.u[p], step.u[p]),
+                     py = float(y / step_px) + vector(base.v[p], step.v[p]);
+        if (!(px >= 0 && py >= 0 && px <= columns - 1 && py <= rows - 1)) return NAN;
         const int ix = int(px), iy = int(py);
         double sum = 0;
         for (const int dy : {0, 1})
             for (const int dx : {0, 1}) {
                 const double weight = (dx ? px - ix : 1 - (px - ix)) * (dy ? py - iy : 1 - (py - iy));
                 if (weight == 0) continue;
-                const int16_t c = counts[size_t(iy + dy) * size_t(width) + size_t(ix + dx)];
+                const int16_t c = counts[size_t((iy + dy) * step_px + color_y) * size_t(width) +
+                                         size_t((ix + dx) * step_px + color_x)];
                 if (c == masked) return NAN;
                 sum += weight * c;
             }
@@ -111,22 +120,22 @@ TEST_P(Warp, wild_motion_is_bilinear_interpolation_too) {
     scene.expect_true(tolerance_12_bits);
 }
 
-// On lines a position is off by 2^-10 pixels and the tolerance; the image has a slope of 100 counts a pixel at most.
+// On lines a position is off by 2^-10 steps and the tolerance; the image has a slope of 100 counts a pixel at most.
 TEST_P(Warp, motion_on_lines_is_bilinear_interpolation_of_positions_nearby) {
     Scene scene(176, 41);
     for (int p = 0; p < 176 * 41; ++p)
         scene.counts[size_t(p)] = int16_t(2000 * std::sin(p % 176 * 0.03) + 1000 * std::cos(p / 176 * 0.04));
     scene.set_motion([](int x, int y) { return Vec3{2.3 + 0.02 * y + 0.3 * x, -1.4 + 0.03 * x, 0}; }, true);
-    scene.tolerance_px = 0.02f;
-    EXPECT_EQ(GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share(), 1);
+    scene.tolerance_steps = 0.02f;
+    EXPECT_EQ(scene.motion().linear_share(), 1);
     scene.expect_true(tolerance_12_bits + 100 * (0.02 + 1 / 1024.0), 2);
 }
 
-TEST_P(Warp, an_edge_of_motion_within_eight_pixels_keeps_its_own_vectors) {
+TEST_P(Warp, an_edge_of_motion_within_a_run_keeps_its_own_vectors) {
     Scene scene(96, 20);
     scene.set_motion([](int x, int) { return Vec3{x < 43 ? 0.25 : 3.5, 0.5, 0}; }, true);
-    scene.tolerance_px = 0.02f;
-    const double share = GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share();
+    scene.tolerance_steps = 0.02f;
+    const double share = scene.motion().linear_share();
     EXPECT_GT(share, 0);
     EXPECT_LT(share, 1);
     for (auto& count : scene.counts) count = int16_t(1000 + count % 8);
@@ -134,7 +143,7 @@ TEST_P(Warp, an_edge_of_motion_within_eight_pixels_keeps_its_own_vectors) {
 }
 
 TEST_P(Warp, planes_narrower_than_a_register_work) {
-    for (const int width : {1, 2, 7, 8, 15, 16, 17}) {
+    for (const int width : {1, 2, 7, 8, 15, 16, 17, 31, 33}) {
         Scene scene(width, 5);
         scene.set_motion([](int, int) { return Vec3{0.6, 0.25, 0}; });
         scene.expect_true(tolerance_12_bits);
@@ -165,11 +174,9 @@ TEST_P(Warp, a_plane_that_holds_its_edges_shows_them_beyond) {
     Scene scene(41, 19);
     scene.set_motion([](int x, int y) { return Vec3{x < 20 ? -30.25 : 30.25, y < 9 ? -25.5 : 25.5, 0}; });
     std::vector<int16_t> out(scene.counts.size());
-    warp_counts({scene.counts.data(), 41, 19, 41, 4095, true}, GroupMotion(scene.base, scene.step, 0), scene.fraction,
-                out.data(), 41);
+    warp_counts({scene.counts.data(), scene.grid(), 41, 4095, true}, scene.motion(), scene.fraction, out.data(), 41);
     std::vector<float> floats(scene.counts.begin(), scene.counts.end()), seen(floats.size());
-    warp_samples({floats.data(), 41, 19, 41, true}, GroupMotion(scene.base, scene.step, 0), scene.fraction, {0, 19},
-                 seen.data(), 41);
+    warp_samples({floats.data(), scene.grid(), 41, true}, scene.motion(), scene.fraction, {0, 19}, seen.data(), 41);
     for (int y = 0; y < 19; ++y)
         for (int x = 0; x < 41; ++x) {
             const int16_t corner = scene.counts[size_t(y < 9 ? 0 : 18) * 41 + (x < 20 ? 0 : 40)];
@@ -179,6 +186,51 @@ TEST_P(Warp, a_plane_that_holds_its_edges_shows_them_beyond) {
         }
 }
 
+// What leads out is read from the margin instead; there lines are followed in coarser units.
+TEST_P(Warp, a_margin_changes_a_count_by_no_more_than_a_lines_rounding) {
+    constexpr int margin = 16, width = 96, height = 40;
+    Scene scene(width, height);
+    scene.step_px = 2;
+    scene.tolerance_steps = 0.02f;
+    for (int p = 0; p < width * height; ++p)
+        scene.counts[size_t(p)] = int16_t(40 * (p % width) + 20 * (p / width) - 2000);
+    scene.set_motion([](int x, int y) { return Vec3{x * 0.01 - 9.37, y * 0.02 - 7.21, 0}; }, true);
+    EXPECT_EQ(scene.motion().linear_share(), 1);
+    constexpr size_t pitch = width + 2 * margin;
+    std::vector<int16_t> wide(pitch * (height + 2 * margin));
+    const auto held = [](int at, int size) { return at < 0 ? at & 1 : at >= size ? size - 2 + (at & 1) : at; };
+    for (int y = -margin; y < height + margin; ++y)
+        for (int x = -margin; x < width + margin; ++x)
+            wide[size_t(y + margin) * pitch + size_t(x + margin)] =
+                scene.counts[size_t(held(y, height)) * width + size_t(held(x, width))];
+    std::vector<int16_t> without(scene.counts.size()), with(scene.counts.size());
+    warp_counts({scene.counts.data(), scene.grid(), width, 4095, true}, scene.motion(), scene.fraction, without.data(),
+                width);
+    warp_counts({&wide[margin * pitch + margin], scene.grid(), pitch, 4095, true, margin}, scene.motion(),
+                scene.fraction, with.data(), width);
+    for (size_t p = 0; p < with.size(); ++p) ASSERT_NEAR(with[p], without[p], 1) << p;
+}
+
+// Runs on lines, without a rounding of positions: eighths.
+TEST_P(Warp, counts_of_14_bits_on_lines_do_not_overflow) {
+    Scene scene(160, 24, 16383);
+    scene.fraction = 0.5f;
+    scene.set_motion([](int x, int y) { return Vec3{(x + y) / 8.0 - 12, x / 16.0 - 3, 0}; }, true);
+    scene.tolerance_steps = 0.02f;
+    EXPECT_EQ(scene.motion().linear_share(), 1);
+    scene.expect_true(tolerance_14_bits);
+}
+
+TEST_P(Warp, no_motion_on_lines_changes_nothing_and_spreads_no_mask) {
+    for (const int step : {1, 2}) {
+        Scene scene(83, 20);
+        scene.step_px = step;
+        for (size_t p = 0; p < scene.counts.size(); p += 11) scene.counts[p] = masked;
+        scene.tolerance_steps = 0.02f;
+        EXPECT_EQ(scene.warped(), scene.counts);
+    }
+}
+
 TEST_P(Warp, flow_that_is_no_number_masks) {
     Scene scene(32, 4);
     scene.base.u[3] = NAN;
@@ -186,6 +238,31 @@ TEST_P(Warp, flow_that_is_no_number_masks) {
     const auto out = scene.warped();
     EXPECT_EQ(out[3], masked);
     EXPECT_EQ(out[70], masked);
+}
+
+// In a mosaic each colour is interpolated among its own samples, by lines, by vectors of its own, and at odd sizes.
+TEST_P(Warp, colors_of_a_mosaic_do_not_mix) {
+    for (const auto& [width, height] : {std::pair{96, 40}, {83, 41}, {20, 6}, {17, 3}, {5, 4}, {1, 1}}) {
+        Scene scene(width, height);
+        scene.step_px = 2;
+        for (size_t p = 5; p < scene.counts.size(); p += 97) scene.counts[p] = masked;
+        scene.set_motion([](int x, int y) { return Vec3{4.3 + 0.02 * y + 0.01 * x, -2.9 + 0.03 * x, 0}; });
+        scene.expect_true(tolerance_12_bits);
+    }
+}
+
+// Colours that differ by far more than a mean of two of them would allow.
+TEST_P(Warp, lines_in_a_mosaic_show_every_color_as_it_was) {
+    Scene scene(160, 40);
+    scene.step_px = 2;
+    for (int p = 0; p < 160 * 40; ++p) {
+        const int x = p % 160, y = p / 160;
+        scene.counts[size_t(p)] = int16_t(1000 * (x % 2 + 2 * (y % 2)) + 3 * x);
+    }
+    scene.set_motion([](int x, int y) { return Vec3{2.6 + 0.02 * y + 0.03 * x, -1.4 + 0.05 * x, 0}; }, true);
+    scene.tolerance_steps = 0.02f;
+    EXPECT_EQ(scene.motion().linear_share(), 1);
+    scene.expect_true(tolerance_12_bits + 6 * (0.02 + 1 / 1024.0), 4);
 }
 
 TEST(WarpPaths, give_the_same_bits) {
@@ -203,10 +280,10 @@ TEST(WarpPaths, give_the_same_bits) {
 TEST_P(Warp, rows_by_themselves_are_the_rows_of_the_whole_plane) {
     Scene scene(97, 33);
     scene.set_motion([](int x, int y) { return Vec3{std::sin(x * 0.3) * 6, std::cos(y * 0.2) * 4, 0}; }, true);
-    scene.tolerance_px = 0.02f;
+    scene.tolerance_steps = 0.02f;
     const auto whole = scene.warped();
-    const GroupMotion motion(scene.base, scene.step, scene.tolerance_px);
-    const CountPlane source{scene.counts.data(), 97, 33, 97};
+    const GroupMotion motion = scene.motion();
+    const CountPlane source{scene.counts.data(), scene.grid(), 97};
     std::vector<int16_t> rows(whole.size());
     for (int y = 0; y < 33; y += 7)
         warp_counts(source, motion, scene.fraction, {y, std::min(7, 33 - y)}, &rows[size_t(y) * 97], 97);
@@ -216,8 +293,8 @@ TEST_P(Warp, rows_by_themselves_are_the_rows_of_the_whole_plane) {
 // Samples that no camera quantised.
 std::vector<float> warped_samples(const Scene& scene, const std::vector<float>& samples) {
     std::vector<float> out(samples.size());
-    const SamplePlane source{samples.data(), scene.width, scene.height, size_t(scene.width)};
-    const GroupMotion motion(scene.base, scene.step, scene.tolerance_px);
+    const SamplePlane source{samples.data(), scene.grid(), size_t(scene.width)};
+    const GroupMotion motion = scene.motion();
     const int half = scene.height / 2;
     warp_samples(source, motion, scene.fraction, {0, half}, out.data(), size_t(scene.width));
     warp_samples(source, motion, scene.fraction, {half, scene.height - half}, &out[size_t(half * scene.width)],
@@ -268,20 +345,20 @@ TEST(SampleWarp, infinite_samples_and_flow_that_is_no_number_become_masked) {
     for (size_t p = 0; p < out.size(); ++p) EXPECT_EQ(std::isnan(out[p]), p == 3 || p == 40 || p == 70) << p;
 }
 
-// Two runs at a time, one, and none that lie on lines, each beside each.
+// Runs that lie on lines, that slip, and that do neither, each beside each.
 TEST(WarpPaths, give_the_same_bits_where_runs_of_all_kinds_meet) {
     Scene scene(206, 60);
     std::mt19937 random(9);
     scene.set_motion(
         [&](int x, int y) {
-            const int kind = (x / 8 * 7 + y * 5) % 11;
+            const int kind = (x / 16 * 7 + y * 5) % 11;
             const double rough = kind < 3 ? double(random() % 100) / 50 : 0;
             return Vec3{0.7 + 0.02 * x + rough + (kind == 5 ? 1e3 : 0),
                         -0.3 + 0.05 * x - (kind == 7 ? 0.4 * (x % 8) : 0), 0};
         },
         true);
     for (size_t p = 0; p < scene.counts.size(); p += 53) scene.counts[p] = masked;
-    scene.tolerance_px = 0.02f;
+    scene.tolerance_steps = 0.02f;
     std::vector<std::vector<int16_t>> results;
     for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
         hwy::SetSupportedTargetsForTest(target);
@@ -299,30 +376,27 @@ TEST_P(Warp, lines_that_slip_a_row_or_a_column_mask_what_masked_counts_have_a_pa
     scene.fraction = 0.5f;
     // Eighths, so that lines are exact and some positions whole.
     scene.set_motion([](int x, int y) { return Vec3{(x + y) / 8.0 - 12, x / 16.0 - 3, 0}; }, true);
-    scene.tolerance_px = 0.02f;
-    EXPECT_EQ(GroupMotion(scene.base, scene.step, scene.tolerance_px).linear_share(), 1);
+    scene.tolerance_steps = 0.02f;
+    EXPECT_EQ(scene.motion().linear_share(), 1);
     scene.expect_true(tolerance_12_bits);
 }
 
-// What a plane's motion must be: the fields enlarged by OpenCV, then one vector for each of the plane's pixels.
-void expect_positions_of_enlarged(const FlowField& base, const FlowField& step, const PlaneGrid& grid,
-                                  double tolerance) {
-    const FlowField large_base = resized(base, grid.frame_width, grid.frame_height);
-    const FlowField large_step = resized(step, grid.frame_width, grid.frame_height);
+// What a frame's motion must be: the fields enlarged by OpenCV, in steps of the grid.
+void expect_vectors_of_enlarged(const FlowField& base, const FlowField& step, const SampleGrid& grid,
+                                double tolerance) {
+    const FlowField large_base = resized(base, grid.width, grid.height);
+    const FlowField large_step = resized(step, grid.width, grid.height);
     const GroupMotion motion(base, step, grid, 1e-6f);
-    const size_t width = size_t(grid.width());
-    ASSERT_EQ(motion.width(), grid.width());
-    ASSERT_EQ(motion.height(), grid.height());
-    std::vector<float> x(width), y(width);
-    for (int row = 0; row < grid.height(); ++row) {
-        motion.positions(row, 0.25f, x.data(), y.data());
+    const size_t width = size_t(grid.width);
+    std::vector<float> u(width), v(width);
+    for (int row = 0; row < grid.height; ++row) {
+        motion.vectors(row, 0.25f, u.data(), v.data());
         for (size_t k = 0; k < width; ++k) {
-            const size_t at = size_t(grid.first_y + grid.step * row) * size_t(grid.frame_width) + size_t(grid.first_x) +
-                              size_t(grid.step) * k;
-            const float u = large_base.u[at] + 0.25f * large_step.u[at],
-                        v = large_base.v[at] + 0.25f * large_step.v[at];
-            ASSERT_NEAR(x[k], float(k) + u / float(grid.step), tolerance) << k << " " << row;
-            ASSERT_NEAR(y[k], float(row) + v / float(grid.step), tolerance) << k << " " << row;
+            const size_t at = size_t(row) * width + k;
+            const float wanted_u = large_base.u[at] + 0.25f * large_step.u[at],
+                        wanted_v = large_base.v[at] + 0.25f * large_step.v[at];
+            ASSERT_NEAR(u[k], wanted_u / float(grid.step), tolerance) << k << " " << row;
+            ASSERT_NEAR(v[k], wanted_v / float(grid.step), tolerance) << k << " " << row;
         }
     }
 }
@@ -336,19 +410,17 @@ FlowField wavy(int width, int height) {
     return flow;
 }
 
-TEST(GroupMotionOfLowResolution, is_bilinear_in_between_for_frames_and_colours) {
+TEST(GroupMotionOfLowResolution, is_bilinear_in_between_for_frames_and_mosaics) {
     for (const int lower : {1, 2, 4})
-        for (const PlaneGrid& grid :
-             {PlaneGrid{104, 48}, PlaneGrid{104, 48, 2, 0, 0}, PlaneGrid{104, 48, 2, 1, 0}, PlaneGrid{104, 48, 2, 0, 1},
-              PlaneGrid{104, 48, 2, 1, 1}, PlaneGrid{8, 4, 2, 1, 1}}) {
-            const FlowField base = wavy(grid.frame_width / lower, grid.frame_height / lower);
-            expect_positions_of_enlarged(base, resized(base, base.width, base.height), grid, 1e-4);
+        for (const SampleGrid& grid : {SampleGrid{104, 48}, SampleGrid{104, 48, 2}, SampleGrid{8, 4, 2}}) {
+            const FlowField base = wavy(grid.width / lower, grid.height / lower);
+            expect_vectors_of_enlarged(base, resized(base, base.width, base.height), grid, 1e-4);
         }
 }
 
 TEST(GroupMotionOfLowResolution, is_enlarged_first_where_frames_are_no_multiple) {
-    expect_positions_of_enlarged(wavy(34, 17), wavy(34, 17), {67, 33}, 1e-4);
-    expect_positions_of_enlarged(wavy(33, 17), wavy(33, 17), {67, 33, 2, 1, 0}, 1e-4);
+    expect_vectors_of_enlarged(wavy(34, 17), wavy(34, 17), {67, 33}, 1e-4);
+    expect_vectors_of_enlarged(wavy(33, 17), wavy(33, 17), {67, 33, 2}, 1e-4);
 }
 
 // What breaks it: a motion edge finer than the field is smeared over a field's pixel.
@@ -356,12 +428,12 @@ TEST(GroupMotionOfLowResolution, smears_an_edge_over_a_pixel_of_the_field) {
     FlowField base(16, 4);
     for (size_t p = 0; p < base.size(); ++p) base.u[p] = p % 16 < 8 ? 0 : 4;
     const GroupMotion motion(base, FlowField(16, 4), {32, 8});
-    std::vector<float> x(32), y(32);
-    motion.positions(3, 0, x.data(), y.data());
-    EXPECT_EQ(x[14] - 14, 0);
-    EXPECT_EQ(x[15] - 15, 2);
-    EXPECT_EQ(x[16] - 16, 6);
-    EXPECT_EQ(x[17] - 17, 8);
+    std::vector<float> u(32), v(32);
+    motion.vectors(3, 0, u.data(), v.data());
+    EXPECT_EQ(u[14], 0);
+    EXPECT_EQ(u[15], 2);
+    EXPECT_EQ(u[16], 6);
+    EXPECT_EQ(u[17], 8);
 }
 
 // By definition, for each pixel; fields with but one row or column included.
