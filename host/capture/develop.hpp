@@ -29,7 +29,7 @@ std::vector<int> missing_basis_slots(const CycleFrames& frames, const Sequence& 
 
 struct DevelopOptions {
     Estimate estimate = Estimate::none;
-    std::vector<LightPosition> lamps;  // of the sphere; for an estimate
+    std::vector<LightPosition> lamps;  // of the sphere; for an estimate with a prior
     int threads = 0;                   // 0: as many as there are processors. Any number gives the same bits.
 };
 
@@ -49,8 +49,8 @@ struct AlignedFrames {
 // filled with what the other rows, and if asked for the prior, say of it (reflectance/fill_model.hpp). The target's mask
 // and noise gain tell which pixels that was, its provenance ("masked") how many and how far they may be off. A pixel that
 // is not solved is 0 under every lamp, or with Estimate::clipped inverted with what its saturated samples read. With a
-// basis that gives each row an image of its own, and no prior, a lost slot is
-// a missing lamp, and a saturated sample stands as it is, a lower bound.
+// basis that gives each row an image of its own, and no prior, a lost slot is a missing lamp, and a saturated sample
+// stands as it is, a lower bound.
 class Developer {
   public:
     // References must outlive the developer.

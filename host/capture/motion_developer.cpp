@@ -50,6 +50,20 @@ TargetMotion motion_around(const MotionPath& path, double reach_s, const Target&
     return motion;
 }
 
+// relative_light() of every eighth pair of pixel rows: some thousands of pixels.
+template <typename Rows>
+std::vector<float> light_of(const Rows& tracking, const Frame& like, const Image& black, size_t instant,
+                            const NoiseModel& noise) {
+    constexpr size_t rows = 2, apart = 16;
+    const int channels = samples_per_pixel(like.cfa);
+    std::vector<RowBand<typename Rows::Sum>> bands;
+    for (size_t y = 0; y < like.height; y += apart)
+        for (int channel = 0; channel < channels; ++channel)
+            bands.push_back(
+                tracking.load({y, std::min(rows, like.height - y), like.width, channel, channels}, like, black, false));
+    return relative_light<typename Rows::Sum>(bands, instant, noise);
+}
+
 }  // namespace
 
 MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration,
@@ -77,6 +91,17 @@ double MotionDeveloper::instant_of(const TargetFrames& frames, const Sequence& s
            (double(frames.basis.target) - double(nearest->number)) * double(sequence.slots.front().period_ticks);
 }
 
+MotionDeveloper::Reach MotionDeveloper::reach_of(const TargetFrames& frames) {
+    Reach reach{middle_tick(*frames.frames.front()), middle_tick(*frames.frames.front())};
+    const auto include = [&](const Frame& frame) {
+        reach.from = std::min(reach.from, middle_tick(frame));
+        reach.to = std::max(reach.to, middle_tick(frame));
+    };
+    for (const auto& frame : frames.frames) include(*frame);
+    for (const MatteFrame& one : frames.matte) include(*one.frame);
+    return reach;
+}
+
 Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
     const Stopwatch watch(times_.flow);
     std::vector<const TargetFrames::Tracking*> fresh;
@@ -92,30 +117,10 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
         if (!added.ok()) return added.error();
         last_tracking_ = fresh[i]->number;
     }
-    double from = middle_tick(*frames.frames.front()), to = from;
-    const auto reach = [&](const Frame& frame) {
-        from = std::min(from, middle_tick(frame));
-        to = std::max(to, middle_tick(frame));
-    };
-    for (const auto& frame : frames.frames) reach(*frame);
-    for (const MatteFrame& one : frames.matte) reach(*one.frame);
+    const auto [from, to] = reach_of(frames);
     if (frames.tracking.empty()) return still_path(from, int(frames.frames[0]->width), int(frames.frames[0]->height));
     flows_.forget_before(from);
     return flows_.path(instant_of(frames, sequence_), from, to);
-}
-
-// relative_light() of every eighth pair of pixel rows: some thousands of pixels.
-template <typename Rows>
-static std::vector<float> light_of(const Rows& tracking, const Frame& like, const Image& black, size_t instant,
-                                   const NoiseModel& noise) {
-    constexpr size_t rows = 2, apart = 16;
-    const int channels = samples_per_pixel(like.cfa);
-    std::vector<RowBand<typename Rows::Sum>> bands;
-    for (size_t y = 0; y < like.height; y += apart)
-        for (int channel = 0; channel < channels; ++channel)
-            bands.push_back(
-                tracking.load({y, std::min(rows, like.height - y), like.width, channel, channels}, like, black, false));
-    return relative_light<typename Rows::Sum>(bands, instant, noise);
 }
 
 template <typename Sample, typename Sum>

@@ -62,6 +62,12 @@ class MotionDeveloper {
     // The middle of the target's tracking exposure, in ticks; where that frame was lost, by its neighbours' word.
     static double instant_of(const TargetFrames& frames, const Sequence& sequence);
 
+    // The middles of the first and the last exposure that are brought to the target, in ticks: of basis and matte frames.
+    struct Reach {
+        double from, to;
+    };
+    static Reach reach_of(const TargetFrames& frames);
+
   private:
     // The frames of the last target, ready to be warped.
     template <typename Sample>

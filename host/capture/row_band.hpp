@@ -29,7 +29,7 @@ struct Band {
 template <typename Sum>
 class RowBand {
   public:
-    // Values are not set but for `masked`, which is 0.
+    // Samples are not set; all else is 0.
     RowBand(size_t rows, size_t samples);
 
     size_t rows() const { return rows_; }

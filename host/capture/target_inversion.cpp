@@ -26,10 +26,6 @@ size_t rows_of_band(size_t width) {
     return std::max<size_t>(1, band_samples / width / unit) * unit;
 }
 
-const char* prior_name(Estimate estimate) {
-    return estimate == Estimate::smooth ? "smooth" : "nonnegative";
-}
-
 // What a target says of its masked samples.
 struct MaskTally {
     size_t filled = 0, unsolved = 0, clipped = 0;
@@ -48,13 +44,13 @@ struct MaskTally {
         nlohmann::json json = {{"filled", filled}, {"unsolved", unsolved}, {"worst_noise_gain", worst_gain}};
         if (estimates.samples > 0)
             json["estimated"] = {{"samples", estimates.samples},
-                                 {"prior", prior_name(estimate)},
+                                 {"prior", estimate_name(estimate)},
                                  {"length_rad", SmoothPrior{}.length_rad},
                                  {"single_share", SmoothPrior{}.single_share},
                                  {"norm_limit", norm_limit},
                                  {"worst_bias", estimates.worst_bias},
                                  {"mean_bias", estimates.mean_bias()}};
-        if (clipped > 0) json["estimated"] = {{"samples", clipped}, {"prior", "clipped"}};
+        if (clipped > 0) json["estimated"] = {{"samples", clipped}, {"prior", estimate_name(Estimate::clipped)}};
         return json;
     }
 };

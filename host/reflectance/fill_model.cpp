@@ -4,9 +4,25 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 
 namespace ols {
+
+const std::vector<std::string>& estimate_names() {
+    static const std::vector<std::string> names = {"none", "smooth", "nonnegative", "clipped"};
+    return names;
+}
+
+const std::string& estimate_name(Estimate estimate) {
+    return estimate_names()[size_t(estimate)];
+}
+
+std::optional<Estimate> estimate_named(const std::string& name) {
+    const auto found = std::ranges::find(estimate_names(), name);
+    if (found == estimate_names().end()) return {};
+    return Estimate(found - estimate_names().begin());
+}
 
 namespace {
 

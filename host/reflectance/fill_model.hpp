@@ -15,6 +15,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "stage/basis.hpp"
@@ -28,6 +30,12 @@ enum class Estimate {
     nonnegative,  // smooth, no value below zero, no saturated sample below white (reflectance/bounded_fill.hpp)
     clipped,      // no prior: saturated samples count as they were read, each a lower bound
 };
+
+// none, smooth, nonnegative, clipped: in the order of Estimate.
+const std::vector<std::string>& estimate_names();
+const std::string& estimate_name(Estimate estimate);
+// Nothing where there is no estimate of that name.
+std::optional<Estimate> estimate_named(const std::string& name);
 
 // Whether lamps that are left free are taken from a prior.
 constexpr bool has_prior(Estimate estimate) {

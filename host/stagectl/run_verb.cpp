@@ -90,8 +90,7 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
     if (report.saturated_share > 0)
         fmt::print(stderr,
                    "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
-                   "for them: "
-                   "shorten the exposure\n",
+                   "for them: shorten the exposure\n",
                    report.saturated_share * 100);
     if (report.unsolved_share > 0)
         fmt::print(
@@ -133,9 +132,7 @@ void add_to_account(std::ofstream& account, const Frame& frame) {
 TakeMasks masks_of(const Options& options) {
     TakeMasks masks;
     masks.fill_from_neighbours = options.fill == "neighbours";
-    if (options.estimate == "smooth") masks.estimate = Estimate::smooth;
-    if (options.estimate == "nonnegative") masks.estimate = Estimate::nonnegative;
-    if (options.estimate == "clipped") masks.estimate = Estimate::clipped;
+    masks.estimate = *estimate_named(options.estimate);  // one of estimate_names(), as the option was checked
     return masks;
 }
 
@@ -257,7 +254,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
             "sample less than white; some milliseconds a pixel; clipped: saturated samples count as they were read, "
             "so that a glint is about as bright as the camera's white. Estimates are masked; those of a prior have a "
             "bound of their bias")
-        ->check(CLI::IsMember({"none", "smooth", "nonnegative", "clipped"}));
+        ->check(CLI::IsMember(estimate_names()));
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");

@@ -2,7 +2,6 @@
 // Pictures of single moments, moved onto another one.
 #include "align_limit.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -52,10 +51,7 @@ AlignLimit::AlignLimit(const Recording& recording, const MotionPath& true_path) 
         visible_.emplace_back(knot.confidence.begin(), knot.confidence.end());
         inside_.push_back(eroded(visible_.back(), truth_.width, truth_.height));
     }
-    std::vector<float> values = truth_.data;
-    const auto bright = values.begin() + std::ptrdiff_t(0.999 * double(values.size() - 1));
-    std::nth_element(values.begin(), bright, values.end());
-    peak_ = double(*bright);
+    peak_ = percentile(truth_.data, 0.999);
 }
 
 template <typename Moved>

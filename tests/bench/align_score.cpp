@@ -18,13 +18,6 @@ double cosine_to(Vec3 direction, Vec3 light) {
     return std::max(0.0, dot(normalized(direction), normalized(light)));
 }
 
-double percentile(std::vector<float> values, double share) {
-    if (values.empty()) return 0;
-    const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return double(*at);
-}
-
 template <typename Images>
 std::vector<const float*> pointers(const Images& images) {
     std::vector<const float*> out;
@@ -52,6 +45,13 @@ void extend(FlowField& flow) {
 }
 
 }  // namespace
+
+double percentile(std::vector<float> values, double share) {
+    if (values.empty()) return 0;
+    const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return double(*at);
+}
 
 const std::vector<Lighting>& lightings() {
     static const std::vector<Lighting> all = {
@@ -140,11 +140,7 @@ double TrueTarget::images_percent(const Target& target, const std::vector<unsign
 MotionPath true_path(const Recording& recording, size_t target) {
     const TargetFrames& frames = recording.targets[target];
     const double at_us = recording.target_us(target), at_tick = MotionDeveloper::instant_of(frames, recording.sequence);
-    double from = middle_tick(*frames.frames.front()), to = from;
-    for (const auto& frame : frames.frames) {
-        from = std::min(from, middle_tick(*frame));
-        to = std::max(to, middle_tick(*frame));
-    }
+    const auto [from, to] = MotionDeveloper::reach_of(frames);
     MotionPath path;
     for (const TargetFrames::Tracking& one : frames.tracking) {
         const double tick = middle_tick(*one.frame);
@@ -175,11 +171,7 @@ Result<MotionPath> found_path(const Recording& recording, size_t target, const M
                       tracking_noise(*one.frame, calibration.black, calibration.flat, recording.camera().noise));
         if (!added) return added.error();
     }
-    double from = middle_tick(*frames.frames.front()), to = from;
-    for (const auto& frame : frames.frames) {
-        from = std::min(from, middle_tick(*frame));
-        to = std::max(to, middle_tick(*frame));
-    }
+    const auto [from, to] = MotionDeveloper::reach_of(frames);
     return flows.path(MotionDeveloper::instant_of(frames, recording.sequence), from, to);
 }
 

@@ -9,6 +9,9 @@
 
 namespace ols {
 
+// The value that this share of them is below; 0 of none.
+double percentile(std::vector<float> values, double share);
+
 // Light from a part of the sphere: a weight for each direction.
 struct Lighting {
     std::string name;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "align_score.hpp"
 #include "image/demosaic.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
@@ -15,12 +16,6 @@ namespace {
 
 constexpr double shown_difference = 0.1;  // of the peak
 constexpr int title_height = 18;
-
-double peak_of(std::vector<float> values) {
-    const auto at = values.begin() + std::ptrdiff_t(0.999 * double(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return double(*at);
-}
 
 // The brightest part of the truth at three quarters, through the preview's tone curve.
 cv::Mat picture(const Image& mosaic, Cfa cfa, double peak) {
@@ -57,7 +52,7 @@ Status write_align_sheet(const std::string& path, Cfa cfa, const std::vector<She
     };
     for (size_t b = 0; b < bands.size(); ++b) {
         const SheetBand& band = bands[b];
-        const double peak = peak_of(band.truth.data);
+        const double peak = percentile(band.truth.data, 0.999);
         paste(picture(band.truth, cfa, peak), 0, 2 * b, band.name + ": truth", cv::INTER_CUBIC);
         for (size_t i = 0; i < band.pictures.size(); ++i) {
             const SheetPicture& one = band.pictures[i];

@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "image/freed_planes.hpp"
+
 namespace ols {
 
 namespace {
@@ -68,6 +70,16 @@ size_t index_of(const Knob& knob, const std::string& setting) {
 }
 
 }  // namespace
+
+void require_freed_planes(const char* program) {
+    if (keep_freed_planes()) return;
+    std::fprintf(
+        stderr,
+        "%s: the allocator returns freed planes to the kernel: times would be those of its clearing pages; run a "
+        "build without sanitizers\n",
+        program);
+    std::exit(1);
+}
 
 std::vector<Timing> compare_times(const std::vector<std::vector<double>>& times_ms, size_t peer) {
     std::vector<Timing> out;

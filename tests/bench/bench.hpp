@@ -30,6 +30,10 @@
 
 namespace ols {
 
+// For benchmarks of planes that are made anew, run after run: keep_freed_planes() (image/freed_planes.hpp), or the program ends
+// with a message, for its times would be those of the kernel's clearing pages.
+void require_freed_planes(const char* program);
+
 struct Setting {
     std::string name;
     std::function<void()> run;           // the work that is timed, whole each time; its result stays for `error`

@@ -13,7 +13,6 @@
 #include "align_sheet.hpp"
 #include "align_takes.hpp"
 #include "bench.hpp"
-#include "image/freed_planes.hpp"
 
 using namespace ols;
 
@@ -316,13 +315,7 @@ void measure_scene(Bench& bench, Takes& takes, const MovingScene& scene) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (!keep_freed_planes()) {
-        fmt::print(
-            stderr,
-            "bench_align: the allocator returns freed planes to the kernel: times would be those of its clearing "
-            "pages; run a build without sanitizers\n");
-        return 1;
-    }
+    require_freed_planes("bench_align");
     cv::setNumThreads(1);
     Bench bench(
         argc, argv,

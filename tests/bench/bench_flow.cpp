@@ -6,7 +6,6 @@
 
 #include "../unit/flow_scenes.hpp"
 #include "bench.hpp"
-#include "image/freed_planes.hpp"
 #include "reflectance/flow.hpp"
 
 using namespace ols;
@@ -100,13 +99,7 @@ std::vector<Setting> pyramid_ratios(const std::vector<FlowScene>& scenes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (!keep_freed_planes()) {
-        std::fputs(
-            "bench_flow: the allocator returns freed planes to the kernel: times would be those of its clearing "
-            "pages\n",
-            stderr);
-        return 1;
-    }
+    require_freed_planes("bench_flow");
     cv::setNumThreads(1);
     Bench bench(
         argc, argv,

@@ -6,7 +6,6 @@
 #include <random>
 
 #include "bench.hpp"
-#include "image/freed_planes.hpp"
 #include "reflectance/masked_sample.hpp"
 #include "reflectance/warp.hpp"
 
@@ -176,13 +175,7 @@ void measure_resolutions(Bench& bench, const Size& size, const std::vector<std::
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (!keep_freed_planes()) {
-        std::fputs(
-            "bench_warp: the allocator returns freed planes to the kernel: times would be those of its clearing "
-            "pages\n",
-            stderr);
-        return 1;
-    }
+    require_freed_planes("bench_warp");
     cv::setNumThreads(1);
     Bench bench(
         argc, argv,

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "capture/frame_store.hpp"
+#include "image/whole_file.hpp"
 #include "inputs.hpp"
 #include "slot_frames.hpp"
 
@@ -49,12 +50,13 @@ template <typename Write>
 Status write_records(const std::string& path, size_t count, size_t bytes, const Write& write) {
     std::error_code error;
     std::filesystem::create_directories(std::filesystem::path(path).parent_path(), error);
-    std::ofstream file(path + ".part", std::ios::binary);
-    for (size_t i = 0; i < count; ++i) file.write(write(i), std::streamsize(bytes));
-    file.close();
-    if (file) std::filesystem::rename(path + ".part", path, error);
-    if (!file || error) return fail("cannot write '" + path + "': check the folder and the space left");
-    return Done{};
+    return write_whole_file(path, [&](const std::string& temporary) -> Status {
+        std::ofstream file(temporary, std::ios::binary);
+        for (size_t i = 0; i < count; ++i) file.write(write(i), std::streamsize(bytes));
+        file.close();
+        if (!file) return fail("cannot write '" + path + "': check the folder and the space left");
+        return Done{};
+    });
 }
 
 // The slot numbers that the targets need: their basis slots, and the tracking slots from before the first to after the last.
