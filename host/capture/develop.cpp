@@ -9,6 +9,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "capture/signal_planes.hpp"
 #include "capture/target_inversion.hpp"
 
 namespace ols {
@@ -89,6 +90,8 @@ Result<Target> Developer::invert(const Rows& rows, const Frame& like, const std:
 Result<Target> Developer::develop(const RowFrames& rows, const std::vector<int>& missing_slots) {
     const Frame* const like = first_frame(rows);
     if (!like) return fail("every basis slot of the cycle is missing");
+    if (fits_shorts(like->format, like->white, calibration_.black))
+        return invert(RecordedRows<int16_t>{rows}, *like, missing_slots);
     if (like->format == PixelFormat::u16) return invert(RecordedRows<int32_t>{rows}, *like, missing_slots);
     return invert(RecordedRows<float>{rows}, *like, missing_slots);
 }

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "capture/above_black.hpp"
 #include "capture/align.hpp"
 #include "reflectance/masked_sample.hpp"
 
@@ -13,7 +15,7 @@ namespace ols {
 namespace {
 
 template <typename Sum>
-using SampleOf = std::conditional_t<std::is_same_v<Sum, int32_t>, uint16_t, float>;
+using SampleOf = std::conditional_t<std::is_integral_v<Sum>, uint16_t, float>;
 
 template <typename Sum>
 const SampleOf<Sum>* samples_of(const Frame& frame, const Band& band, size_t y) {
@@ -27,27 +29,39 @@ std::vector<Sum> prepare_black(RowBand<Sum>& loaded, const Band& band, const Ima
     std::vector<Sum> level(band.samples());
     for (size_t p = 0; p < band.samples(); ++p) {
         const float counts = black.data[(band.first_pixel() + p) * size_t(band.channels) + size_t(band.channel)];
-        level[p] = std::is_same_v<Sum, int32_t> ? Sum(std::round(counts)) : Sum(counts);
+        level[p] = std::is_integral_v<Sum> ? Sum(std::round(counts)) : Sum(counts);
         loaded.black_rest[p] = counts - float(level[p]);
         loaded.white[p] = white - float(level[p]);
     }
     return level;
 }
 
+// Marks samples at or above white, and others that are not finite.
+template <typename Count>
+void mark_unseen(const Count* samples, size_t step, float white, std::span<uint8_t> masked) {
+    for (size_t x = 0; x < masked.size(); ++x) {
+        const auto value = float(samples[x * step]);
+        if (value >= white)
+            masked[x] |= mask_saturated;
+        else if (!std::isfinite(value))
+            masked[x] |= mask_missing;
+    }
+}
+
 template <typename Sum>
 void load_frame(const Frame& frame, const Band& band, const std::vector<Sum>& black, bool clipped_stay, Sum* out,
-                uint8_t* masked) {
+                std::vector<uint8_t>& masked) {
+    constexpr int most = std::is_same_v<Sum, int16_t> ? 32767 : 65535;
+    const auto step = size_t(band.channels);
     for (size_t y = 0; y < band.rows; ++y) {
         const auto* samples = samples_of<Sum>(frame, band, y);
         const size_t first = y * band.width;
-        for (size_t x = 0; x < band.width; ++x) {
-            const auto counts = samples[x * size_t(band.channels)];
-            const bool saturated = float(counts) >= frame.white, finite = std::isfinite(float(counts));
-            const Sum above_black = Sum(counts) - black[first + x];
-            out[first + x] = finite && (!saturated || clipped_stay) ? above_black : masked_sample<Sum>;
-            if (saturated) masked[first + x] |= mask_saturated;
-            if (!finite && !saturated) masked[first + x] |= mask_missing;
-        }
+        const auto subtract = [&](float white) {
+            return subtract_black(samples, step, {white, most}, &black[first], band.width, out + first);
+        };
+        if (!subtract(frame.white)) continue;
+        mark_unseen(samples, step, frame.white, {&masked[first], band.width});
+        if (clipped_stay) subtract(std::numeric_limits<float>::infinity());
     }
 }
 
@@ -57,7 +71,7 @@ void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Ba
                bool clipped_stay, std::span<Sum> out, std::vector<uint8_t>& masked) {
     std::vector<float> sums(band.samples()), counts(band.samples());
     for (const auto& frame : frames) {
-        load_frame(*frame, band, black, clipped_stay, out.data(), masked.data());
+        load_frame(*frame, band, black, clipped_stay, out.data(), masked);
         for (size_t p = 0; p < out.size(); ++p) {
             if (is_masked(out[p])) continue;
             sums[p] += float(out[p]);
@@ -65,10 +79,13 @@ void load_mean(const std::vector<std::shared_ptr<const Frame>>& frames, const Ba
         }
     }
     for (size_t p = 0; p < out.size(); ++p) sums[p] = counts[p] > 0 ? sums[p] / counts[p] : 0;
-    if constexpr (std::is_same_v<Sum, int32_t>)
-        align_samples(sums, out);
-    else
+    if constexpr (std::is_integral_v<Sum>) {
+        std::vector<int32_t> whole(sums.size());
+        align_samples(sums, whole);
+        std::ranges::copy(whole, out.begin());
+    } else {
         std::ranges::copy(sums, out.begin());
+    }
     for (size_t p = 0; p < out.size(); ++p)
         if (counts[p] == 0) out[p] = masked_sample<Sum>;
 }
@@ -99,7 +116,7 @@ RowBand<Sum> RecordedRows<Sum>::load(const Band& band, const Frame& like, const 
             std::fill_n(out, band.samples(), masked_sample<Sum>);
             for (uint8_t& mark : loaded.masked) mark |= mask_missing;
         } else if (rows[row].size() == 1) {
-            load_frame(*rows[row][0], band, level, clipped_stay, out, loaded.masked.data());
+            load_frame(*rows[row][0], band, level, clipped_stay, out, loaded.masked);
         } else {
             load_mean(rows[row], band, level, clipped_stay, {out, band.samples()}, loaded.masked);
         }
@@ -110,6 +127,7 @@ RowBand<Sum> RecordedRows<Sum>::load(const Band& band, const Frame& like, const 
 template class RowBand<int16_t>;
 template class RowBand<int32_t>;
 template class RowBand<float>;
+template struct RecordedRows<int16_t>;
 template struct RecordedRows<int32_t>;
 template struct RecordedRows<float>;
 

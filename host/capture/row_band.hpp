@@ -47,8 +47,9 @@ class RowBand {
     std::vector<Sum, PlaneAllocator<Sum>> samples_;
 };
 
-// The rows of a basis as they were recorded: the mean of each row's frames, rounded to whole counts for int32_t, without
-// samples at or above white or not finite; a sample that no frame has is masked.
+// The rows of a basis as they were recorded: the mean of each row's frames, rounded to whole counts for integers, without
+// samples at or above white or not finite; a sample that no frame has is masked. int16_t only where fits_shorts()
+// (capture/signal_planes.hpp).
 template <typename Summed>
 struct RecordedRows {
     using Sum = Summed;

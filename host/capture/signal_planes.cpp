@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "reflectance/masked_sample.hpp"
+#include "capture/above_black.hpp"
 
 namespace ols {
 
@@ -14,59 +14,15 @@ namespace {
 
 constexpr int largest_short = 16383;  // warp_counts()
 
-// Which samples are masked, and what those that are not are held to.
-struct Limits {
-    float white;  // infinity: none is masked but for what is not finite
-    int most;
-};
-
-// Every step-th of `samples`, less black, masked where it is not below white; and whether any is. The step, and whether there is a
-// white, are known when compiled and counts stay in 16 bits, or the loop would not be vectorised.
-template <size_t step, bool has_white, typename Sample>
-bool subtract_counts(const uint16_t* samples, const Limits& limits, const Sample* black, size_t width, Sample* out) {
-    const auto limit = uint16_t(std::ceil(std::min(limits.white, 65535.0f))), most = uint16_t(limits.most);
-    uint16_t largest = 0;
-    for (size_t x = 0; x < width; ++x) {
-        const uint16_t counts = samples[x * step], held = std::min(counts, most);
-        largest = std::max(largest, counts);
-        Sample value;
-        if constexpr (std::is_same_v<Sample, int16_t>)  // modulo 2^16
-            value = Sample(uint16_t(held - uint16_t(black[x])));
-        else
-            value = Sample(held) - black[x];
-        out[x] = !has_white || counts < limit ? value : masked_sample<Sample>;
-    }
-    return has_white && largest >= limit;
-}
-
-template <size_t step, typename Sample>
-bool subtract_row(const uint16_t* samples, const Limits& limits, const Sample* black, size_t width, Sample* out) {
-    return limits.white <= 65535 ? subtract_counts<step, true>(samples, limits, black, width, out)
-                                 : subtract_counts<step, false>(samples, limits, black, width, out);
-}
-
-template <size_t step, typename Sample>
-bool subtract_row(const float* samples, const Limits& limits, const Sample* black, size_t width, Sample* out) {
-    bool masked = false;
-    for (size_t x = 0; x < width; ++x) {
-        const float value = samples[x * step];
-        const bool is_seen = std::isfinite(value) && value < limits.white;
-        masked |= !is_seen;
-        out[x] = is_seen ? Sample(value) - black[x] : masked_sample<Sample>;
-    }
-    return masked;
-}
-
 template <typename Count, typename Sample>
-bool subtract_channel(const Frame& frame, size_t channel, const Limits& limits, const MarginedPlane<Sample>& black,
+bool subtract_channel(const Frame& frame, size_t channel, const SampleLimits& limits, const MarginedPlane<Sample>& black,
                       MarginedPlane<Sample>& out) {
     const auto step = size_t(samples_per_pixel(frame.cfa));
     bool masked = false;
     for (int y = 0; y < int(frame.height); ++y) {
         const auto* samples =
             reinterpret_cast<const Count*>(frame.samples.data() + size_t(y) * frame.pitch_bytes) + channel;
-        masked |= step == 3 ? subtract_row<3>(samples, limits, black.row(y), frame.width, out.row(y))
-                            : subtract_row<1>(samples, limits, black.row(y), frame.width, out.row(y));
+        masked |= subtract_black(samples, step, limits, black.row(y), frame.width, out.row(y));
     }
     out.fill_margin();
     return masked;
@@ -74,14 +30,15 @@ bool subtract_channel(const Frame& frame, size_t channel, const Limits& limits, 
 
 // The channels, and whether any sample is masked.
 template <typename Sample>
-bool subtract(const Frame& frame, const Limits& limits, const SignalPlanes<Sample>& black,
+bool subtract(const Frame& frame, const SampleLimits& limits, const SignalPlanes<Sample>& black,
               typename SignalPlanes<Sample>::Channels& channels) {
     bool masked = false;
     for (size_t c = 0; c < black.channels.size(); ++c) {
         auto& out = channels.emplace_back(black.channels[c].grid());
-        masked |= frame.format == PixelFormat::u16
-                      ? subtract_channel<uint16_t, Sample>(frame, c, limits, black.channels[c], out)
-                      : subtract_channel<float, Sample>(frame, c, limits, black.channels[c], out);
+        if (std::is_same_v<Sample, int16_t> || frame.format == PixelFormat::u16)
+            masked |= subtract_channel<uint16_t>(frame, c, limits, black.channels[c], out);
+        else if constexpr (std::is_same_v<Sample, float>)
+            masked |= subtract_channel<float>(frame, c, limits, black.channels[c], out);
     }
     return masked;
 }

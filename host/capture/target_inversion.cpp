@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "parallel.hpp"
 #include "reflectance/demultiplex.hpp"
 #include "reflectance/estimate_bound.hpp"
+#include "reflectance/masked_sample.hpp"
 #include "reflectance/variance.hpp"
 #include "stage/playback.hpp"
 
@@ -56,14 +58,33 @@ struct MaskTally {
 };
 
 // Filled samples may need more than 16 bits.
-RowBand<int32_t> widened(const RowBand<int16_t>& band) {
-    const size_t samples = band.masked.size();
-    RowBand<int32_t> wide(band.rows(), samples);
-    for (size_t row = 0; row < band.rows(); ++row)
-        std::transform(band.row(row), band.row(row) + samples, wide.row(row),
-                       [](int16_t v) { return is_masked(v) ? masked_sample<int32_t> : int32_t(v); });
-    wide.masked = band.masked, wide.black_rest = band.black_rest, wide.white = band.white;
-    return wide;
+template <typename Count>
+using Filled = std::conditional_t<std::is_same_v<Count, int16_t>, int32_t, Count>;
+
+std::vector<uint32_t> masked_samples(const std::vector<uint8_t>& marks) {
+    std::vector<uint32_t> found;
+    for (size_t p = 0; p < marks.size(); ++p)
+        if (marks[p]) found.push_back(uint32_t(p));
+    return found;
+}
+
+// These samples of a band, as a band of their own. What they leave behind counts 0 and is not masked, in any row.
+template <typename Count>
+RowBand<Filled<Count>> taken_out(RowBand<Count>& band, const std::vector<uint32_t>& samples) {
+    RowBand<Filled<Count>> taken(band.rows(), samples.size());
+    for (size_t row = 0; row < band.rows(); ++row) {
+        Count* const from = band.row(row);
+        for (size_t k = 0; k < samples.size(); ++k) {
+            const Count count = std::exchange(from[samples[k]], Count(0));
+            taken.row(row)[k] = is_masked(count) ? masked_sample<Filled<Count>> : Filled<Count>(count);
+        }
+    }
+    for (size_t k = 0; k < samples.size(); ++k) {
+        const uint32_t p = samples[k];
+        taken.masked[k] = std::exchange(band.masked[p], uint8_t(0));
+        taken.black_rest[k] = band.black_rest[p], taken.white[k] = band.white[p];
+    }
+    return taken;
 }
 
 // What all bands of a target share.
@@ -111,43 +132,24 @@ class BandInversion {
 
     void invert() {
         RowBand<Sum> loaded = load(!job_.fills);
-        if constexpr (std::is_same_v<Sum, int16_t>)
-            if (needs_filling(loaded)) return invert(widened(loaded));
-        invert(std::move(loaded));
-    }
-
-  private:
-    using Sum = typename Rows::Sum;
-
-    RowBand<Sum> load(bool clipped_stay) const {
-        return recorded_.load(band_, shared_.like, job_.calibration.black, clipped_stay);
-    }
-
-    template <typename Count>
-    void invert(RowBand<Count> loaded) {
-        std::vector<Count*> rows;
-        for (size_t row = 0; row < loaded.rows(); ++row) rows.push_back(loaded.row(row));
-        const std::vector<const Count*> inputs(rows.begin(), rows.end());
-        prepare_gain();
-        fill(loaded, rows);
-        shared_.demultiplexer.invert(std::span<const Count* const>(inputs), band_.samples(), lamps_,
-                                     {.gain = gain_, .threads = 1});
-        subtract_black_rest(loaded.black_rest);
-        std::vector<float> variance;
-        if constexpr (!std::is_same_v<Count, float>) {
-            variance.resize(band_.samples());
-            shared_.variance.estimate(inputs, band_.samples(), gain_, variance.data());
-        }
-        if (!sample_fills_.empty()) note_fills(variance);
         for (size_t p = 0; p < band_.samples(); ++p) target_.mask[band_.first_pixel() + p] |= loaded.masked[p];
+        for (const int row : target_.missing_lamps) std::fill_n(loaded.row(size_t(row)), band_.samples(), Sum(0));
+        prepare_gain();
+        const std::vector<uint32_t> masked = job_.fills ? masked_samples(loaded.masked) : std::vector<uint32_t>();
+        std::vector<float> variance =
+            masked.empty() ? solve(loaded, gain_, lamps_) : solve_with_masked(loaded, masked);
+        if (!sample_fills_.empty()) note_fills(variance);
         // Of the colours of a pixel, their mean.
         for (size_t p = 0; p < variance.size(); ++p)
             target_.variance[band_.first_pixel() + p] += variance[p] / float(target_.planes());
     }
 
-    template <typename Count>
-    bool needs_filling(const RowBand<Count>& loaded) const {
-        return job_.fills && std::ranges::any_of(loaded.masked, [](uint8_t mark) { return mark != 0; });
+  private:
+    using Sum = typename Rows::Sum;
+    using FilledBand = RowBand<Filled<Sum>>;
+
+    RowBand<Sum> load(bool clipped_stay) const {
+        return recorded_.load(band_, shared_.like, job_.calibration.black, clipped_stay);
     }
 
     // gain = 1 / (F t) for each sample of the band.
@@ -160,51 +162,93 @@ class BandInversion {
         }
     }
 
+    // From counts, of which none is masked, to lamps. Their variance, of a camera that counts.
     template <typename Count>
-    void fill(const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
-        for (const int row : target_.missing_lamps) std::fill_n(rows[size_t(row)], loaded.masked.size(), Count(0));
-        if (!needs_filling(loaded)) return;
-        sample_fills_.resize(loaded.masked.size());
-        if constexpr (!std::is_same_v<Count, int16_t>) {  // invert() widened
-            fill_rows(filler(loaded, sample_fills_), rows, loaded.masked);
-            if (job_.estimate == Estimate::clipped) count_clipped(loaded, rows);
+    std::vector<float> solve(const RowBand<Count>& counts, std::span<const float> gain,
+                             const std::vector<float*>& lamps) const {
+        std::vector<const Count*> rows;
+        for (size_t row = 0; row < counts.rows(); ++row) rows.push_back(counts.row(row));
+        shared_.demultiplexer.invert(std::span<const Count* const>(rows), gain.size(), lamps,
+                                     {.gain = gain, .threads = 1});
+        subtract_black_rest(counts.black_rest, gain, lamps);
+        std::vector<float> variance;
+        if constexpr (!std::is_same_v<Count, float>) {
+            variance.resize(gain.size());
+            shared_.variance.estimate(rows, gain.size(), gain, variance.data());
         }
+        return variance;
     }
 
-    template <typename Count>
-    RowFiller filler(const RowBand<Count>& loaded, std::span<SampleFill> fills) const {
-        return {job_.fills(), {loaded.black_rest, loaded.white, shared_.is_lost, job_.noise}, fills};
+    // No sample depends on another: the few that are masked, mostly, are filled and solved by themselves.
+    std::vector<float> solve_with_masked(RowBand<Sum>& loaded, const std::vector<uint32_t>& masked) {
+        FilledBand apart = taken_out(loaded, masked);
+        const std::vector<SampleFill> fills = fill(apart, masked);
+        sample_fills_.resize(band_.samples());
+        std::vector<float> gain;
+        for (size_t k = 0; k < masked.size(); ++k) {
+            sample_fills_[masked[k]] = fills[k];
+            gain.push_back(gain_[masked[k]]);
+        }
+        if (masked.size() == band_.samples()) return solve(apart, gain, lamps_);
+
+        std::vector<float> variance = solve(loaded, gain_, lamps_);
+        std::vector<float> images(lamps_.size() * masked.size());
+        std::vector<float*> lamps;
+        for (size_t lamp = 0; lamp < lamps_.size(); ++lamp) lamps.push_back(&images[lamp * masked.size()]);
+        const std::vector<float> variance_apart = solve(apart, gain, lamps);
+        for (size_t lamp = 0; lamp < lamps_.size(); ++lamp)
+            for (size_t k = 0; k < masked.size(); ++k) lamps_[lamp][masked[k]] = lamps[lamp][k];
+        for (size_t k = 0; k < variance_apart.size(); ++k) variance[masked[k]] = variance_apart[k];
+        return variance;
     }
 
-    // Pixels that were not solved are filled again, with what their saturated samples read: then lost rows alone are masked.
-    template <typename Count>
-    void count_clipped(const RowBand<Count>& loaded, const std::vector<Count*>& rows) {
-        std::vector<uint8_t> unsolved(sample_fills_.size());
-        std::ranges::transform(sample_fills_, unsolved.begin(),
+    // `samples`: where in the band they lie.
+    std::vector<SampleFill> fill(FilledBand& apart, const std::vector<uint32_t>& samples) {
+        std::vector<SampleFill> fills(samples.size());
+        fill_rows(filler(apart, fills), rows_of(apart), apart.masked);
+        if (job_.estimate == Estimate::clipped) count_clipped(apart, samples, fills);
+        return fills;
+    }
+
+    static std::vector<Filled<Sum>*> rows_of(FilledBand& apart) {
+        std::vector<Filled<Sum>*> rows;
+        for (size_t row = 0; row < apart.rows(); ++row) rows.push_back(apart.row(row));
+        return rows;
+    }
+
+    RowFiller filler(const FilledBand& apart, std::span<SampleFill> fills) const {
+        return {job_.fills(), {apart.black_rest, apart.white, shared_.is_lost, job_.noise}, fills};
+    }
+
+    // Samples that were not solved are filled again, with what those that are saturated read: then lost rows alone are masked.
+    void count_clipped(FilledBand& apart, const std::vector<uint32_t>& samples, std::vector<SampleFill>& fills) {
+        std::vector<uint8_t> unsolved(fills.size());
+        std::ranges::transform(fills, unsolved.begin(),
                                [](const SampleFill& done) { return done.kind == FillKind::unsolved; });
         if (std::ranges::find(unsolved, 1) == unsolved.end()) return;
         const RowBand<Sum> clipped = load(true);
-        for (size_t row = 0; row < rows.size(); ++row)
-            for (size_t p = 0; p < unsolved.size(); ++p)
-                if (unsolved[p]) {
-                    const Sum count = clipped.row(row)[p];
-                    rows[row][p] = is_masked(count) ? masked_sample<Count> : Count(count);
+        for (size_t row = 0; row < apart.rows(); ++row)
+            for (size_t k = 0; k < unsolved.size(); ++k)
+                if (unsolved[k]) {
+                    const Sum count = clipped.row(row)[samples[k]];
+                    apart.row(row)[k] = is_masked(count) ? masked_sample<Filled<Sum>> : Filled<Sum>(count);
                 }
         std::vector<SampleFill> again(unsolved.size());
-        fill_rows(filler(loaded, again), rows, unsolved);
-        for (size_t p = 0; p < unsolved.size(); ++p) {
-            if (!unsolved[p]) continue;
-            sample_fills_[p] = again[p];
-            if (again[p].kind != FillKind::unsolved) sample_fills_[p].kind = FillKind::clipped;
+        fill_rows(filler(apart, again), rows_of(apart), unsolved);
+        for (size_t k = 0; k < unsolved.size(); ++k) {
+            if (!unsolved[k]) continue;
+            fills[k] = again[k];
+            if (again[k].kind != FillKind::unsolved) fills[k].kind = FillKind::clipped;
         }
     }
 
-    void subtract_black_rest(const std::vector<float>& rest) {
+    void subtract_black_rest(const std::vector<float>& rest, std::span<const float> gain,
+                             const std::vector<float*>& lamps) const {
         if (std::ranges::all_of(rest, [](float counts) { return counts == 0; })) return;
-        for (size_t lamp = 0; lamp < lamps_.size(); ++lamp)
+        for (size_t lamp = 0; lamp < lamps.size(); ++lamp)
             for (size_t p = 0; p < rest.size(); ++p)
-                lamps_[lamp][p] -= float(shared_.weight_sums[lamp] * rest[p] * gain_[p]);
-        for (const int lamp : target_.missing_lamps) std::fill_n(lamps_[size_t(lamp)], rest.size(), 0.0f);
+                lamps[lamp][p] -= float(shared_.weight_sums[lamp] * rest[p] * gain[p]);
+        for (const int lamp : target_.missing_lamps) std::fill_n(lamps[size_t(lamp)], rest.size(), 0.0f);
     }
 
     // Masks, noise gain and variance of what was filled; pixels that were not solved become 0.
@@ -290,6 +334,7 @@ Target invert_rows(const Rows& rows, const Frame& like, const InversionJob& job)
     return target;
 }
 
+template Target invert_rows(const RecordedRows<int16_t>&, const Frame&, const InversionJob&);
 template Target invert_rows(const RecordedRows<int32_t>&, const Frame&, const InversionJob&);
 template Target invert_rows(const RecordedRows<float>&, const Frame&, const InversionJob&);
 template Target invert_rows(const AlignedRows<int16_t, int16_t>&, const Frame&, const InversionJob&);
