@@ -162,24 +162,33 @@ bool may_change(const Sum* first, const Sum* last, const Sum* now, float first_s
     return changes != 0;
 }
 
+// The count that stands ten standard deviations of its noise above black: y = 10 (read + shot sqrt y). Masked ones, the least
+// integer or NaN, are not above it.
+double least_lit(const NoiseModel& noise) {
+    constexpr double deviations = 10;
+    const double half = deviations * noise.shot / 2,
+                 root = half + std::sqrt(half * half + deviations * noise.read_counts);
+    return root * root;
+}
+
 }  // namespace
 
 template <typename Sum>
 std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t instant, const NoiseModel& noise) {
-    constexpr double deviations_above_black = 10;
     constexpr size_t fewest = 64;
-    const auto is_lit = [&](Sum sample) {
-        return !is_masked(sample) && sample > 0 &&
-               double(sample) > deviations_above_black * (noise.read_counts + noise.shot * std::sqrt(double(sample)));
-    };
+    const auto least = float(least_lit(noise));
+    std::vector<std::vector<uint32_t>> lit(bands.size());  // of each band, where the target's own frame is
+    for (size_t b = 0; b < bands.size(); ++b)
+        for (size_t p = 0; p < bands[b].masked.size(); ++p)
+            if (float(bands[b].row(instant)[p]) > least) lit[b].push_back(uint32_t(p));
     std::vector<float> light(bands.front().rows(), 1.0f), quotients;
     for (size_t k = 0; k < light.size(); ++k) {
         if (k == instant) continue;
         quotients.clear();
-        for (const RowBand<Sum>& band : bands)
-            for (size_t p = 0; p < band.masked.size(); ++p)
-                if (const Sum now = band.row(instant)[p], then = band.row(k)[p]; is_lit(now) && is_lit(then))
-                    quotients.push_back(float(then) / float(now));
+        for (size_t b = 0; b < bands.size(); ++b)
+            for (const uint32_t p : lit[b])
+                if (const auto now = float(bands[b].row(instant)[p]), then = float(bands[b].row(k)[p]); then > least)
+                    quotients.push_back(then / now);
         if (quotients.size() < fewest) continue;
         const auto middle = quotients.begin() + std::ptrdiff_t(quotients.size() / 2);
         std::ranges::nth_element(quotients, middle);

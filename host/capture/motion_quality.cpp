@@ -11,7 +11,7 @@ std::vector<MotionQuality> presets() {
     // In small images patches find what moves far more surely than a pyramid does.
     const FlowOptions quick{DisFlowOptions{.finest_scale = 0, .patch_stride = 5, .iterations = 12, .refinements = 0}};
     return {{},
-            {"preview", true, {.local = quick, .refinement = {}, .reduced_side = 120}, 0.4f},
+            {"preview", true, {.local = quick, .refinement = {}, .reduced_side = 120}, 0.8f},
             {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}},
             {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.05f}};
 }

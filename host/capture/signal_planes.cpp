@@ -15,8 +15,8 @@ namespace {
 constexpr int largest_short = 16383;  // warp_counts()
 
 template <typename Count, typename Sample>
-bool subtract_channel(const Frame& frame, size_t channel, const SampleLimits& limits, const MarginedPlane<Sample>& black,
-                      MarginedPlane<Sample>& out) {
+bool subtract_channel(const Frame& frame, size_t channel, const SampleLimits& limits,
+                      const MarginedPlane<Sample>& black, MarginedPlane<Sample>& out) {
     const auto step = size_t(samples_per_pixel(frame.cfa));
     bool masked = false;
     for (int y = 0; y < int(frame.height); ++y) {

@@ -95,7 +95,9 @@ struct TargetJob {
     std::vector<uint8_t> is_lost;  // of each row
     Demultiplexer demultiplexer;
     VarianceEstimate variance;
-    std::vector<double> weight_sums;  // of each image over all rows: what a constant in all rows becomes
+    // What a constant in all rows becomes: the sums of an image's weights, of which images share some.
+    std::vector<double> weight_sums;
+    std::vector<size_t> weight_sum_of;  // of each image
 
     TargetJob(const Frame& like_frame, const InversionJob& inversion, std::vector<int> lost)
         : like(like_frame),
@@ -103,12 +105,23 @@ struct TargetJob {
           lost_rows(std::move(lost)),
           is_lost(size_t(inversion.basis.rows)),
           demultiplexer(inversion.basis),
-          variance(inversion.basis, inversion.noise),
-          weight_sums(size_t(inversion.basis.images())) {
+          variance(inversion.basis, inversion.noise) {
         for (const int row : lost_rows) is_lost[size_t(row)] = 1;
-        for (int row = 0; row < job.basis.rows; ++row)
-            for (int image = 0; image < job.basis.images(); ++image)
-                weight_sums[size_t(image)] += job.basis.inverse(row, image);
+        for (int image = 0; image < job.basis.images(); ++image) {
+            const double sum = weight_sum(image);
+            const auto known = std::ranges::find(weight_sums, sum);
+            weight_sum_of.push_back(size_t(known - weight_sums.begin()));
+            if (known == weight_sums.end()) weight_sums.push_back(sum);
+        }
+    }
+
+  private:
+    double weight_sum(int image) const {
+        const Basis& basis = job.basis;
+        double sum = 0;  // exact where weights are integers
+        for (int row = 0; row < basis.rows; ++row)
+            sum += basis.has_integers() ? basis.weight(row, image) : basis.inverse(row, image);
+        return basis.has_integers() ? basis.scale * sum : sum;
     }
 };
 
@@ -136,8 +149,7 @@ class BandInversion {
         for (const int row : target_.missing_lamps) std::fill_n(loaded.row(size_t(row)), band_.samples(), Sum(0));
         prepare_gain();
         const std::vector<uint32_t> masked = job_.fills ? masked_samples(loaded.masked) : std::vector<uint32_t>();
-        std::vector<float> variance =
-            masked.empty() ? solve(loaded, gain_, lamps_) : solve_with_masked(loaded, masked);
+        std::vector<float> variance = masked.empty() ? solve(loaded, gain_, lamps_) : solve_with_masked(loaded, masked);
         if (!sample_fills_.empty()) note_fills(variance);
         // Of the colours of a pixel, their mean.
         for (size_t p = 0; p < variance.size(); ++p)
@@ -168,9 +180,13 @@ class BandInversion {
                              const std::vector<float*>& lamps) const {
         std::vector<const Count*> rows;
         for (size_t row = 0; row < counts.rows(); ++row) rows.push_back(counts.row(row));
+        const auto rests = black_rests(counts.black_rest, gain);
+        std::vector<const float*> rest_of;
+        for (size_t lamp = 0; lamp < lamps.size() && !rests.empty(); ++lamp)
+            rest_of.push_back(rests[shared_.weight_sum_of[lamp]].data());
         shared_.demultiplexer.invert(std::span<const Count* const>(rows), gain.size(), lamps,
-                                     {.gain = gain, .threads = 1});
-        subtract_black_rest(counts.black_rest, gain, lamps);
+                                     {.gain = gain, .threads = 1, .offsets = rest_of});
+        for (const int lamp : target_.missing_lamps) std::fill_n(lamps[size_t(lamp)], gain.size(), 0.0f);
         std::vector<float> variance;
         if constexpr (!std::is_same_v<Count, float>) {
             variance.resize(gain.size());
@@ -242,13 +258,15 @@ class BandInversion {
         }
     }
 
-    void subtract_black_rest(const std::vector<float>& rest, std::span<const float> gain,
-                             const std::vector<float*>& lamps) const {
-        if (std::ranges::all_of(rest, [](float counts) { return counts == 0; })) return;
-        for (size_t lamp = 0; lamp < lamps.size(); ++lamp)
-            for (size_t p = 0; p < rest.size(); ++p)
-                lamps[lamp][p] -= float(shared_.weight_sums[lamp] * rest[p] * gain[p]);
-        for (const int lamp : target_.missing_lamps) std::fill_n(lamps[size_t(lamp)], rest.size(), 0.0f);
+    // Of each weight sum, what the rest of the black level becomes in a lamp; empty where the level is whole.
+    std::vector<std::vector<float>> black_rests(const std::vector<float>& rest, std::span<const float> gain) const {
+        if (std::ranges::all_of(rest, [](float counts) { return counts == 0; })) return {};
+        std::vector<std::vector<float>> out;
+        for (const double sum : shared_.weight_sums) {
+            std::vector<float>& lamp = out.emplace_back(rest.size());
+            for (size_t p = 0; p < rest.size(); ++p) lamp[p] = float(sum * rest[p] * gain[p]);
+        }
+        return out;
     }
 
     // Masks, noise gain and variance of what was filled; pixels that were not solved become 0.

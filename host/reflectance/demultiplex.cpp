@@ -72,7 +72,11 @@ template <typename Sample>
 void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<const Sample* const> rows,
                          size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
-    HadamardJob job{.plan = &made.plan, .floats = {lamps}, .factors = factors, .filler = options.filler};
+    HadamardJob job{.plan = &made.plan,
+                    .floats = {lamps},
+                    .factors = factors,
+                    .offsets = options.offsets,
+                    .filler = options.filler};
     if constexpr (std::is_same_v<Sample, int16_t>)
         job.rows16 = {rows};
     else
@@ -196,12 +200,27 @@ double largest_count(const std::vector<const int32_t*>& rows, size_t count) {
 class MatrixWorker {
   public:
     MatrixWorker(const Basis& basis, const InverseMatrix& matrix, std::span<float* const> lamps,
-                 std::span<const float> factors)
-        : basis_(basis), matrix_(matrix), lamps_(lamps), factors_(factors), one_row_each_(is_one_image_a_row(basis)) {}
+                 std::span<const float> factors, std::span<const float* const> offsets)
+        : basis_(basis),
+          matrix_(matrix),
+          lamps_(lamps),
+          factors_(factors),
+          offsets_(offsets),
+          one_row_each_(is_one_image_a_row(basis)) {}
 
     template <typename Sample>
     void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
-        if (one_row_each_) return scale(rows, begin, count);
+        if (one_row_each_)
+            scale(rows, begin, count);
+        else
+            multiply(rows, begin, count);
+        for (size_t i = 0; i < offsets_.size(); ++i)
+            for (size_t p = begin; p < begin + count; ++p) lamps_[i][p] -= offsets_[i][p];
+    }
+
+  private:
+    template <typename Sample>
+    void multiply(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
         bool fits_float = false;
         if constexpr (std::is_same_v<Sample, int32_t>) fits_float = largest_count(rows, count) < matrix_.counts_limit;
         if (fits_float)
@@ -210,7 +229,6 @@ class MatrixWorker {
             multiply(large_, matrix_.doubles, rows, begin, count);
     }
 
-  private:
     template <typename Real, typename Sample>
     void multiply(Block<Real>& block, const std::vector<Real>& matrix, const std::vector<const Sample*>& rows,
                   size_t begin, size_t count) {
@@ -237,6 +255,7 @@ class MatrixWorker {
     const InverseMatrix& matrix_;
     std::span<float* const> lamps_;
     std::span<const float> factors_;
+    std::span<const float* const> offsets_;
     bool one_row_each_;
     Block<float> small_;
     Block<double> large_;
@@ -252,7 +271,7 @@ void demultiplex_by_matrix(const InverseMatrix& matrix, const Basis& basis, std:
         return from;
     };
     for_each_block(samples, options.threads, [&] {
-        MatrixWorker worker(basis, matrix, lamps, factors);
+        MatrixWorker worker(basis, matrix, lamps, factors, options.offsets);
         if constexpr (std::is_same_v<Sample, float>)
             return [&, worker = std::move(worker)](size_t begin, size_t count) mutable {
                 worker.invert(at(begin), begin, count);

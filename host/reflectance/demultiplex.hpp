@@ -20,6 +20,8 @@ struct DemultiplexOptions {
     int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
     // Asked for masked samples of rows of counts (masked_sample.hpp). Without it no sample is masked and no row null.
     const SampleFiller* filler = nullptr;
+    // Taken off the lamps at last: a pointer each, to a value a sample. Empty: nothing is.
+    std::span<const float* const> offsets = {};
 };
 
 // A basis made ready to be inverted, for who does it band after band. From any number of threads.

@@ -66,15 +66,13 @@ Range brightness_range(const Image& image) {
     return {*least, *most};
 }
 
-// Brings both images to a range of about 0 to 1. Each by its own range: exposures may differ. False where one is even: there is
+// Brings an image to a range of about 0 to 1. Each by its own range: exposures may differ. False where it is even: there is
 // nothing to find.
-bool equalize_exposure(FlowPair& pair) {
-    for (Image* image : {&pair.from, &pair.to}) {
-        const Range range = brightness_range(*image);
-        const float scale = 1 / (range.high - range.low);
-        if (!(range.high > range.low) || !std::isfinite(scale)) return false;
-        for (float& v : image->data) v = (v - range.low) * scale;
-    }
+bool equalize_exposure(Image& image) {
+    const Range range = brightness_range(image);
+    const float scale = 1 / (range.high - range.low);
+    if (!(range.high > range.low) || !std::isfinite(scale)) return false;
+    for (float& v : image.data) v = (v - range.low) * scale;
     return true;
 }
 
@@ -208,17 +206,28 @@ Result<FlowOptions> flow_method(const std::string& name) {
 Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOptions& options,
                                 const FlowField* initial) {
     if (Status fits = check(from, to, initial); !fits) return fits.error();
+    return estimate_flow(flow_image(from, options.saturation), flow_image(to, options.saturation), options, initial);
+}
+
+FlowImage flow_image(Image image, float saturation) {
+    FlowImage out{std::move(image), {}, false};
+    out.seen = hide_unseen(out.image, saturation);
+    out.is_even = !equalize_exposure(out.image);
+    return out;
+}
+
+Result<FlowField> estimate_flow(const FlowImage& from, const FlowImage& to, const FlowOptions& options,
+                                const FlowField* initial) {
+    if (Status fits = check(from.image, to.image, initial); !fits) return fits.error();
     if (Status sane = std::visit([](const auto& method) { return check(method); }, options.method); !sane)
         return sane.error();
-    FlowPair pair{from, to, {}, {}};
-    pair.from_seen = hide_unseen(pair.from, options.saturation);
-    pair.to_seen = hide_unseen(pair.to, options.saturation);
+    if (from.is_even || to.is_even) return initial ? *initial : FlowField(from.image.width, from.image.height);
+    FlowPair pair{from.image, to.image, from.seen, to.seen};
     if (pair.from_seen.data.empty() != pair.to_seen.data.empty()) {
         Image& all = pair.from_seen.data.empty() ? pair.from_seen : pair.to_seen;
-        all = Image(from.width, from.height, 1);
+        all = Image(from.image.width, from.image.height, 1);
         std::fill(all.data.begin(), all.data.end(), 1.0f);
     }
-    if (!equalize_exposure(pair)) return initial ? *initial : FlowField(from.width, from.height);
     try {
         return std::visit([&](const auto& method) { return run(pair, method, initial); }, options.method);
     } catch (const cv::Exception& e) {

@@ -40,6 +40,18 @@ Result<FlowOptions> flow_method(const std::string& name);
 Result<FlowField> estimate_flow(const Image& from, const Image& to, const FlowOptions& options = {},
                                 const FlowField* initial = nullptr);
 
+// An image made ready for any method, for who needs several flows of it.
+struct FlowImage {
+    Image image;           // in a range of about 0 to 1
+    Image seen;            // as FlowPair's
+    bool is_even = false;  // it shows nothing at all
+};
+// One channel, at least 16 pixels a side.
+FlowImage flow_image(Image image, float saturation = std::numeric_limits<float>::infinity());
+// The same flow, bit for bit, as from the images themselves; the options' saturation is the images' already.
+Result<FlowField> estimate_flow(const FlowImage& from, const FlowImage& to, const FlowOptions& options = {},
+                                const FlowField* initial = nullptr);
+
 // The forward-backward check: how well `backward` (from `to` to `from`) leads back what `forward` led away, a pixel of `from`
 // each: 1 / (1 + (miss / allowed)^2), allowed = 0.5 pixels + 1 % of both vectors' lengths (what flow errs and bilinear reading
 // of `backward` adds). 1: it comes back exactly; 1/2: it misses by as much as is allowed; 0: it leads outside the image, or

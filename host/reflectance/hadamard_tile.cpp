@@ -193,7 +193,7 @@ uint64_t store_lamps(const HadamardJob& job, size_t begin, size_t count, const Z
     uint64_t clipped = 0;
     const auto store = [&]<typename Value>(const Planes<Value>& planes) HWY_ATTR {
         if (planes.empty()) return;
-        const Sink<Value> sink{planes, planes.offset(begin), count, factors};
+        const Sink<Value> sink{planes, planes.offset(begin), count, factors, job.offsets, begin};
         clipped += store_lamps(*job.plan, sink, z, extra_row, sums);
     };
     store(job.sums), store(job.shorts), store(job.floats), store(job.halves);
@@ -302,15 +302,24 @@ class TileInverter {
     // Copies a tile's rows, of either width, to places of 32 bits. True when one of them is masked.
     template <typename Sample>
     bool load_long(const Planes<const Sample>& rows, size_t begin, size_t count) {
+        const Longs d;
+        // Without a filler nothing is masked, and this is what the lowest value becomes: itself.
+        const auto lowest = hn::Set(d, masked_sample<Sample>);
+        const auto lost = hn::Set(d, job_.filler ? masked_sample<int32_t> : int32_t(masked_sample<Sample>));
         bool masked = false;
         for (int r = 0; r < plan_.rows; ++r) {
             int32_t* const to = scratch_.long_places() + size_t(r) * tile_samples;
-            const Sample* const row = rows.first[size_t(r)];
-            std::fill_n(to, tile_samples, 0);
-            for (size_t i = 0; i < count; ++i) {
-                const bool lost = !row || (job_.filler && row[rows.offset(begin) + i] == masked_sample<Sample>);
-                to[i] = lost ? masked_sample<int32_t> : row[rows.offset(begin) + i];
-                masked = masked || lost;
+            const Sample* from = rows.first[size_t(r)];
+            alignas(64) Sample padded[tile_samples] = {};
+            if (!from)
+                std::fill_n(padded, count, masked_sample<Sample>);
+            else
+                std::copy_n(from + rows.offset(begin), count, padded);
+            for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) {
+                const auto counts = HWY_NAMESPACE::load_long(padded + i);
+                const auto is_lost = hn::Eq(counts, lowest);
+                masked = masked || (job_.filler && !hn::AllFalse(d, is_lost));
+                hn::Store(hn::IfThenElse(is_lost, lost, counts), d, to + i);
             }
         }
         return masked;

@@ -22,9 +22,10 @@ struct HadamardJob {
     // Any of these, a plane a lamp:
     Planes<int32_t> sums = {};     // z itself
     Planes<int16_t> shorts = {};   // z, the nearest there is where it does not fit; TileCounts::clipped counts these
-    Planes<float> floats = {};     // z times factor
+    Planes<float> floats = {};     // z times factor, less offset
     Planes<uint16_t> halves = {};  // the same as IEEE half, to the nearest even; infinite from 65520
-    std::span<const float> factors = {};  // one a sample, for floats and halves
+    std::span<const float> factors = {};         // one a sample, for floats and halves
+    std::span<const float* const> offsets = {};  // a pointer a lamp, to one a sample; empty: none
     // Asked for the samples of every tile that has a masked one (masked_sample.hpp). Without it nothing is masked: the
     // lowest value is a count like any other, and no row is null.
     const SampleFiller* filler = nullptr;

@@ -53,18 +53,27 @@ HWY_INLINE auto half_of(V value) {
 }
 #endif
 
+// What becomes of the samples of a tile on their way to floats; offsets may be null.
+struct Calibration {
+    const float *factors, *offsets;  // the factors aligned
+
+    HWY_INLINE Calibration from(size_t i) const { return {factors + i, offsets ? offsets + i : nullptr}; }
+};
+
 // One vector of z as each type of output.
-HWY_INLINE auto converted(LongVector z, const float*, int32_t) {
+HWY_INLINE auto converted(LongVector z, const Calibration&, int32_t) {
     return z;
 }
-HWY_INLINE auto converted(LongVector z, const float*, int16_t) {
+HWY_INLINE auto converted(LongVector z, const Calibration&, int16_t) {
     return hn::DemoteTo(hn::Rebind<int16_t, Longs>(), z);  // saturates
 }
-HWY_INLINE auto converted(LongVector z, const float* factors, float) {
-    return hn::Mul(hn::ConvertTo(Floats(), z), hn::Load(Floats(), factors));
+HWY_INLINE auto converted(LongVector z, const Calibration& of, float) {
+    const Floats d;
+    const auto value = hn::Mul(hn::ConvertTo(d, z), hn::Load(d, of.factors));
+    return of.offsets ? hn::Sub(value, hn::LoadU(d, of.offsets)) : value;
 }
-HWY_INLINE auto converted(LongVector z, const float* factors, uint16_t) {
-    return half_of(converted(z, factors, float()));
+HWY_INLINE auto converted(LongVector z, const Calibration& of, uint16_t) {
+    return half_of(converted(z, of, float()));
 }
 
 // Stream for vectors of 16 bytes or more, which alone there are instructions for.
@@ -82,26 +91,32 @@ struct Sink {
     Planes<Value> planes;
     size_t offset, count;
     const float* factors;  // aligned
+    std::span<const float* const> offsets;
+    size_t begin;  // the tile's first sample in `offsets`
 
     template <typename Lane>
     HWY_INLINE void put(size_t lamp, const Lane* z) const {
         Value* const to = planes.first[lamp] + offset;
-        if (count == tile_samples && reinterpret_cast<uintptr_t>(to) % 64 == 0) return stream(z, to);
+        const float* less = offsets.empty() ? nullptr : offsets[lamp] + begin;
+        if (count == tile_samples && reinterpret_cast<uintptr_t>(to) % 64 == 0) return stream(z, {factors, less}, to);
         alignas(64) Value values[tile_samples];
+        alignas(64) float padded[tile_samples];
+        if (less && count < tile_samples) less = std::copy_n(less, count, padded) - count;
+        const Calibration of{factors, less};
         for (size_t i = 0; i < tile_samples; i += hn::Lanes(Longs()))
-            hn::Store(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), values + i);
+            hn::Store(converted(load_long(z + i), of.from(i), Value()), hn::Rebind<Value, Longs>(), values + i);
         std::copy_n(values, count, to);
     }
 
   private:
     template <typename Lane>
-    HWY_INLINE void stream(const Lane* z, Value* to) const {
+    HWY_INLINE void stream(const Lane* z, const Calibration& of, Value* to) const {
         if constexpr (std::is_same_v<Value, Lane>) {
             const hn::CappedTag<Value, tile_samples> d;
             for (size_t i = 0; i < tile_samples; i += hn::Lanes(d)) hn::Stream(hn::Load(d, z + i), d, to + i);
         } else {
             for (size_t i = 0; i < tile_samples; i += hn::Lanes(Longs()))
-                write_past(converted(load_long(z + i), factors + i, Value()), hn::Rebind<Value, Longs>(), to + i);
+                write_past(converted(load_long(z + i), of.from(i), Value()), hn::Rebind<Value, Longs>(), to + i);
         }
     }
 };

@@ -96,14 +96,15 @@ Status TrackingFlows::add(double tick, const Image& image, const Image& sigma) {
     if (std::min(width_, height_) < 16)
         return fail("frames of " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                     " pixels are too small for motion compensation: at least 16 a side");
-    Frame frame{tick, std::move(small), {}, {}, {}};
+    Frame frame{tick, {}, {}, {}, {}};
     if (!sigma.data.empty()) {
         assert(sigma.width == image.width && sigma.height == image.height);
         Image noise = shrunk(sigma, reduction_);
         for (float& v : noise.data) v /= float(reduction_);  // of a mean over reduction^2 pixels
-        frame.evenness = evenness_of(frame.image, noise);
-        frame.image = without_even_parts(frame.image, *frame.evenness);
+        frame.evenness = evenness_of(small, noise);
+        small = without_even_parts(small, *frame.evenness);
     }
+    frame.image = flow_image(std::move(small), options_.local.saturation);
     frames_.push_back(std::move(frame));
     return Done{};
 }
@@ -114,7 +115,7 @@ void TrackingFlows::forget_before(double tick) {
 
 Status TrackingFlows::find_local_flows(size_t first, size_t last) {
     struct Task {
-        const Image *from, *to;
+        const FlowImage *from, *to;
         std::optional<FlowField>* flow;
     };
     std::vector<Task> tasks;

@@ -62,7 +62,7 @@ class TrackingFlows {
   private:
     struct Frame {
         double tick;
-        Image image;
+        FlowImage image;
         std::optional<Evenness> evenness;
         std::optional<FlowField> forward, backward;  // to the next frame, and from there
     };

@@ -139,6 +139,22 @@ TEST_P(Demultiplex, rows_of_16_bits_give_the_bits_of_32) {
     }
 }
 
+TEST_P(Demultiplex, offsets_are_taken_off_the_lamps_at_last) {
+    constexpr size_t samples = 1100;  // whole blocks and tiles, and parts of them
+    const Counts rows = random_lamps(basis.rows, samples, -4095, 4095);
+    const std::vector<float> gain(samples, 0.01f);
+    const auto plain = demultiplexed(basis, rows, {gain, 1});
+    std::vector<std::vector<float>> offsets(2, std::vector<float>(samples, 0.375f));
+    for (size_t p = 0; p < samples; ++p) offsets[1][p] = 0.01f * float(p) - 3;
+    std::vector<const float*> of_lamp;
+    for (int lamp = 0; lamp < basis.images(); ++lamp) of_lamp.push_back(offsets[size_t(lamp % 2)].data());
+    for (const int threads : {1, 3}) {
+        const auto lamps = demultiplexed(basis, rows, {.gain = gain, .threads = threads, .offsets = of_lamp});
+        for (size_t lamp = 0; lamp < lamps.size(); ++lamp)
+            for (size_t p = 0; p < samples; ++p) ASSERT_EQ(lamps[lamp][p], plain[lamp][p] - offsets[lamp % 2][p]);
+    }
+}
+
 TEST_P(Demultiplex, masked_samples_and_lost_rows_of_16_bits_are_filled_like_those_of_32) {
     Counts rows = random_lamps(basis.rows, 700, -100, 4095);
     std::mt19937 random(2);

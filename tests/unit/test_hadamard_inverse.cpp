@@ -156,7 +156,7 @@ TEST_P(HadamardInverse, ordinary_counts_need_no_fallback) {
 }
 
 // Every output type of the same rows, in images that begin at odd places and in tiles.
-TEST_P(HadamardInverse, shorts_floats_and_halves_are_the_sums_rounded_as_they_say) {
+TEST_P(HadamardInverse, shorts_floats_and_halves_are_the_sums_rounded_as_they_say_less_their_offsets) {
     constexpr size_t samples = 4 * tile_samples + 5, tiles = 5;
     Planes rows = random_rows(samples, -200, 200);
     for (auto& row : rows) row[2] *= 120;  // too bright for shorts
@@ -165,8 +165,15 @@ TEST_P(HadamardInverse, shorts_floats_and_halves_are_the_sums_rounded_as_they_sa
     for (size_t p = 0; p < samples; ++p) factors[p] = 0.0125f * float(p % 9) - 0.03f;
     factors[7] = 1e-9f, factors[8] = 2e-8f, factors[9] = 1e4f;  // zero, subnormal and infinite halves
     const size_t images = size_t(basis.images());
+    // Each other lamp has them from another list.
+    const std::vector<float> even(samples, 0.25f);
+    std::vector<float> odd(samples);
+    for (size_t p = 0; p < samples; ++p) odd[p] = 0.5f - 0.01f * float(p);
+    std::vector<const float*> offsets;
+    for (size_t i = 0; i < images; ++i) offsets.push_back(i % 2 ? odd.data() : even.data());
     for (const char* path : tile_paths())
         for (const bool tiled : {false, true}) {
+            const bool has_offsets = tiled;
             choose_tile_path(path);
             const size_t image_step = tiled ? tile_samples : samples + 3,
                          tile_step = tiled ? images * tile_samples : tile_samples;
@@ -186,19 +193,21 @@ TEST_P(HadamardInverse, shorts_floats_and_halves_are_the_sums_rounded_as_they_sa
             const auto rows32 = pointers<const int32_t>(rows);
             TileScratch scratch(plan);
             counts = {};
-            invert_tiles({.plan = &plan,
-                          .rows32 = {rows32},
-                          .shorts = {short_images, tile_step},
-                          .floats = {float_images, tile_step},
-                          .halves = {half_images, tile_step},
-                          .factors = factors},
-                         0, samples, scratch, counts);
+            invert_tiles(
+                {.plan = &plan,
+                 .rows32 = {rows32},
+                 .shorts = {short_images, tile_step},
+                 .floats = {float_images, tile_step},
+                 .halves = {half_images, tile_step},
+                 .factors = factors,
+                 .offsets = has_offsets ? std::span<const float* const>(offsets) : std::span<const float* const>()},
+                0, samples, scratch, counts);
             uint64_t clipped = 0;
             const ols::Planes<float> layout{float_images, tile_step};
             for (size_t i = 0; i < images; ++i)
                 for (size_t p = 0; p < samples; ++p) {
                     const int32_t z = sums[i][p];
-                    const float value = float(z) * factors[p];
+                    const float value = float(z) * factors[p] - (has_offsets ? offsets[i][p] : 0);
                     const size_t at = layout.offset(p);
                     clipped += z != std::clamp(z, -32768, 32767);
                     ASSERT_EQ(short_images[i][at], std::clamp(z, -32768, 32767)) << path;
