@@ -43,6 +43,7 @@ Alignment::Alignment(const MotionPath& path, int width, int height, Cfa cfa, flo
         const FlowField still(width, height);
         intervals_.push_back({path[0].tick, path[0].tick + 1, {still, still, grid, line_tolerance_steps}, {}});
         intervals_[0].confidence.assign(still.size(), 0.0f);
+        moves_.resize(still.size());
         return;
     }
     std::vector<std::optional<Interval>> made(path.size() - 1);
@@ -57,6 +58,18 @@ Alignment::Alignment(const MotionPath& path, int width, int height, Cfa cfa, flo
                            enlarged(worse, first.flow, width, height)};
     });
     for (auto& interval : made) intervals_.push_back(std::move(*interval));
+    find_moves(width, height);
+}
+
+void Alignment::find_moves(int width, int height) {
+    moves_.resize(size_t(width) * size_t(height));
+    for (const Interval& interval : intervals_)
+        for (int y = 0; y < height; ++y)
+            for (int run = 0; run < interval.motion.runs(); ++run) {
+                if (interval.motion.is_still(run, y)) continue;
+                const int first = run * GroupMotion::run_samples;
+                std::fill_n(moves_.begin() + y * width + first, std::min(GroupMotion::run_samples, width - first), 1);
+            }
 }
 
 Alignment::Place Alignment::place_of(double tick) const {

@@ -44,6 +44,8 @@ class Alignment {
     // Of each pixel of the target, the lower of the interval's two knots.
     const std::vector<float>& confidence(size_t interval) const { return intervals_[interval].confidence; }
     size_t intervals() const { return intervals_.size(); }
+    // Of each pixel: not 0 where motion in any interval leads anywhere else.
+    const std::vector<uint8_t>& moves() const { return moves_; }
 
   private:
     struct Interval {
@@ -51,7 +53,10 @@ class Alignment {
         GroupMotion motion;
         std::vector<float> confidence;
     };
+    void find_moves(int width, int height);
+
     std::vector<Interval> intervals_;
+    std::vector<uint8_t> moves_;
 };
 
 }  // namespace ols

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <optional>
 #include <type_traits>
 
 #include "reflectance/masked_sample.hpp"
@@ -66,7 +65,7 @@ template <typename Sample, typename Sum>
 std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
     std::vector<bool> is_used(alignment->intervals());
     for (const auto& sources : rows)
-        for (const Source& source : sources) is_used[source.place.interval] = true;
+        for (const Source& source : sources) is_used[source.nearer.place.interval] = true;
     std::vector<float> least(alignment->confidence(0).size(), 1.0f);
     for (size_t i = 0; i < is_used.size(); ++i)
         if (is_used[i])
@@ -76,35 +75,64 @@ std::vector<float> AlignedRows<Sample, Sum>::confidence() const {
 }
 
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::load_row(size_t row, const Band& band, bool clipped_stay,
-                                        const FollowedBrightness<Sum>* brightness, RowBand<Sum>& loaded) const {
-    const std::span<Sum> out(loaded.row(row), band.samples());
-    std::vector<uint8_t>& masked = loaded.masked;
+size_t AlignedRows<Sample, Sum>::blended_sources() const {
+    size_t count = 0;
+    for (const auto& sources : rows)
+        count += size_t(std::ranges::count_if(sources, [](const Source& source) { return source.across.has_value(); }));
+    return count;
+}
+
+// False where it is known that no sample is masked.
+template <typename Sample, typename Sum>
+bool AlignedRows<Sample, Sum>::load_recorded(const Recorded& recorded, const Loading& loading, Sum* out) const {
+    const auto& [planes, place] = recorded;
+    const bool may_lack =
+        warp(planes->channels, planes->largest, alignment->motion(place.interval), place.fraction, loading.band, out);
+    if (loading.brightness) loading.brightness->apply(place, out);
+    return planes->any_masked && may_lack;
+}
+
+template <typename Sample, typename Sum>
+void AlignedRows<Sample, Sum>::load_nearer(const Source& source, Loading& loading, std::span<Sum> out) const {
+    if (!load_recorded(source.nearer, loading, out.data())) return;
+    std::vector<uint8_t>& masked = loading.loaded.masked;
+    for (size_t p = 0; p < out.size(); ++p) masked[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
+    if (!loading.clipped_stay) return;
+    const auto& [planes, place] = source.nearer;
+    warp(planes->clipped, planes->largest, alignment->motion(place.interval), place.fraction, loading.band,
+         loading.beside.data());
+    for (size_t p = 0; p < out.size(); ++p)
+        if (is_masked(out[p])) out[p] = loading.beside[p];
+}
+
+// `part`: of the row that the source is.
+template <typename Sample, typename Sum>
+void AlignedRows<Sample, Sum>::blend(const Across& across, float part, Loading& loading, std::span<Sum> out) const {
+    const float* const trust = across.trust->data() + loading.band.first_pixel();
+    if (std::all_of(trust, trust + out.size(), [](float value) { return value == 0; })) return;
+    load_recorded(across.recorded, loading, loading.beside.data());
+    blend_across<Sum>({out, loading.beside.data(), trust, across.share, loading.loaded.noise.data(), part});
+}
+
+template <typename Sample, typename Sum>
+void AlignedRows<Sample, Sum>::load_row(size_t row, Loading& loading) const {
+    const std::span<Sum> out(loading.loaded.row(row), loading.band.samples());
+    std::vector<uint8_t>& masked = loading.loaded.masked;
     const std::vector<Source>& sources = rows[row];
     std::vector<float> sums(sources.size() > 1 ? out.size() : 0), counts(sums.size());
-    std::vector<Sum, PlaneAllocator<Sum>> clipped;
     if (sources.empty()) {
         std::ranges::fill(out, masked_sample<Sum>);
         for (uint8_t& mark : masked) mark |= mask_missing;
     }
-    for (const auto& [planes, place] : sources) {
-        const GroupMotion& motion = alignment->motion(place.interval);
-        const bool may_lack = warp(planes->channels, planes->largest, motion, place.fraction, band, out.data());
-        if (brightness) brightness->apply(place, loaded, row);
-        if (planes->any_masked && may_lack) {
-            for (size_t p = 0; p < out.size(); ++p) masked[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
-            if (clipped_stay) {
-                clipped.resize(out.size());
-                warp(planes->clipped, planes->largest, motion, place.fraction, band, clipped.data());
-                for (size_t p = 0; p < out.size(); ++p)
-                    if (is_masked(out[p])) out[p] = clipped[p];
-            }
-        }
+    for (const Source& source : sources) {
+        load_nearer(source, loading, out);
         if (masks_untrusted) {
-            const float* trust = alignment->confidence(place.interval).data() + band.first_pixel();
+            const float* trust =
+                alignment->confidence(source.nearer.place.interval).data() + loading.band.first_pixel();
             for (size_t p = 0; p < out.size(); ++p)
                 if (trust[p] < trusted_confidence) out[p] = masked_sample<Sum>, masked[p] |= mask_misaligned;
         }
+        if (source.across) blend(*source.across, 1 / float(sources.size()), loading, out);
         for (size_t p = 0; p < sums.size(); ++p)
             if (!is_masked(out[p])) sums[p] += float(out[p]), ++counts[p];
     }
@@ -118,9 +146,15 @@ RowBand<Sum> AlignedRows<Sample, Sum>::load(const Band& band, const Frame& like,
     RowBand<Sum> loaded(rows.size(), band.samples());
     set_black(loaded, band, like, black);
     std::optional<FollowedBrightness<Sum>> brightness;
-    if (tracking) brightness.emplace(tracking->load(band, like, black, false), tracking_light, instant, noise);
-    for (size_t row = 0; row < rows.size(); ++row)
-        load_row(row, band, clipped_stay, brightness ? &*brightness : nullptr, loaded);
+    if (tracking)
+        brightness.emplace(tracking->load(band, like, black, false), tracking_light, instant, noise,
+                           std::span(alignment->moves()).subspan(band.first_pixel(), band.samples()));
+    constexpr size_t lanes = 16;
+    const size_t padded = (band.samples() + lanes - 1) / lanes * lanes;
+    if (blended_sources() > 0) loaded.noise.assign(padded, 0.0f);
+    Loading loading{band, clipped_stay, brightness ? &*brightness : nullptr, loaded, {}};
+    loading.beside.resize(padded);
+    for (size_t row = 0; row < rows.size(); ++row) load_row(row, loading);
     return loaded;
 }
 

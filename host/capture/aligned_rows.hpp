@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "capture/followed_brightness.hpp"
 #include "capture/row_band.hpp"
 #include "capture/signal_planes.hpp"
+#include "capture/slot_interpolation.hpp"
 
 namespace ols {
 
@@ -18,9 +20,19 @@ namespace ols {
 template <typename Sample, typename Summed>
 struct AlignedRows {
     using Sum = Summed;
-    struct Source {
+    struct Recorded {
         std::shared_ptr<const SignalPlanes<Sample>> planes;
         Alignment::Place place;
+    };
+    // The same slot's frame across the target.
+    struct Across {
+        Recorded recorded;
+        std::shared_ptr<const std::vector<float>> trust;  // trust_across()
+        float share;                                      // of the nearer one
+    };
+    struct Source {
+        Recorded nearer;
+        std::optional<Across> across = {};
     };
     std::vector<std::vector<Source>> rows;  // by basis row; none where it was lost
     std::shared_ptr<const Alignment> alignment;
@@ -39,13 +51,24 @@ struct AlignedRows {
     // outside the frame takes the frame's edge, and is not marked: confidence() says that it is not trusted.
     RowBand<Sum> load(const Band& band, const Frame& like, const Image& black, bool clipped_stay) const;
 
-    // Of each pixel, the least of all intervals that frames are taken from.
+    // Of each pixel, the least of all intervals that the nearer frames are taken from.
     std::vector<float> confidence() const;
 
+    size_t blended_sources() const;  // that have a frame across
+
   private:
-    // `brightness` may be null.
-    void load_row(size_t row, const Band& band, bool clipped_stay, const FollowedBrightness<Sum>* brightness,
-                  RowBand<Sum>& loaded) const;
+    // A band on its way.
+    struct Loading {
+        const Band& band;
+        bool clipped_stay;
+        const FollowedBrightness<Sum>* brightness;  // may be null
+        RowBand<Sum>& loaded;
+        std::vector<Sum, PlaneAllocator<Sum>> beside;  // as long as a row
+    };
+    bool load_recorded(const Recorded& recorded, const Loading& loading, Sum* out) const;
+    void load_nearer(const Source& source, Loading& loading, std::span<Sum> out) const;
+    void blend(const Across& across, float part, Loading& loading, std::span<Sum> out) const;
+    void load_row(size_t row, Loading& loading) const;
 };
 
 }  // namespace ols

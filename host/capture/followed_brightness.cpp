@@ -16,19 +16,27 @@
 // clang-format on
 #include <hwy/highway.h>
 
+#include "capture/sample_lanes_inl.hpp"
+
 #ifndef OLS_FOLLOWED_BRIGHTNESS_TYPES
 #define OLS_FOLLOWED_BRIGHTNESS_TYPES
 namespace ols {
 
 constexpr size_t block_samples = 16;  // divides a cache line of any kind of sample: rows of a band are padded to lines
 
-// One interval, for a slot at a fraction of it.
+// A knot's tracking samples beside the target's own.
 template <typename Sum>
+struct Compared {
+    const Sum *then, *now;
+    float scale;         // brings `then` to the target's light
+    const float* noise;  // the difference that noise may make; infinite where `now` is not known
+};
+
+// One interval, for a slot at a fraction of it.
 struct Following {
     const std::vector<uint32_t>& blocks;
-    const Sum *first, *last, *now;
-    const float* least;
-    float first_scale, last_scale, fraction;
+    const float *first, *last;  // divisors of the knots at its ends
+    float fraction;
 };
 
 }  // namespace ols
@@ -39,90 +47,54 @@ namespace ols {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::CappedTag<float, block_samples>;
-using Longs = hn::RebindToSigned<Floats>;
-using FloatVector = hn::Vec<Floats>;
-using FloatMask = hn::Mask<Floats>;
-
-struct Samples {
-    FloatVector value;
-    FloatMask is_seen;
-};
-
+// divisors = 1 / (1 + g (T0 / T - 1))
 template <typename Sum>
-HWY_INLINE Samples load(const Sum* at) {
-    const Floats d;
-    if constexpr (std::is_same_v<Sum, float>) {
-        const FloatVector value = hn::LoadU(d, at);
-        return {value, hn::Eq(value, value)};
-    } else {
-        const Longs di;
-        auto counts = hn::Zero(di);
-        if constexpr (sizeof(Sum) == 2)
-            counts = hn::PromoteTo(di, hn::LoadU(hn::Rebind<int16_t, Floats>(), at));
-        else
-            counts = hn::LoadU(di, at);
-        return {hn::ConvertTo(d, counts), hn::RebindMask(d, hn::Ne(counts, hn::Set(di, masked_sample<Sum>)))};
-    }
-}
-
-template <typename Sum>
-HWY_INLINE void store(FloatMask changes, FloatVector value, Sum* at) {
-    const Floats d;
-    if constexpr (std::is_same_v<Sum, float>) {
-        hn::StoreU(hn::IfThenElse(changes, value, hn::LoadU(d, at)), d, at);
-    } else {
-        const Longs di;
-        // What fits_shorts() promises of shorts, and SampleFiller asks of others.
-        constexpr float most = sizeof(Sum) == 2 ? 16383.0f : 8388607.0f;
-        const auto held = hn::Min(hn::Max(value, hn::Set(d, -most)), hn::Set(d, most));
-        const auto counts = hn::ConvertTo(di, hn::Add(held, hn::CopySign(hn::Set(d, 0.5f), held)));
-        const auto is_changed = hn::RebindMask(di, changes);
-        if constexpr (sizeof(Sum) == 2) {
-            const hn::Rebind<int16_t, Floats> d16;
-            const auto before = hn::PromoteTo(di, hn::LoadU(d16, at));
-            hn::StoreU(hn::DemoteTo(d16, hn::IfThenElse(is_changed, counts, before)), d16, at);
-        } else {
-            hn::StoreU(hn::IfThenElse(is_changed, counts, hn::LoadU(di, at)), di, at);
-        }
-    }
-}
-
-template <typename Sum>
-void follow_in(const Following<Sum>& following, Sum* samples) {
+void compare_in(const Compared<Sum>& knot, size_t count, float* divisors) {
     constexpr float largest_factor = 4;
     const Floats d;
-    const auto fraction = hn::Set(d, following.fraction), zero = hn::Zero(d);
-    const auto first_scale = hn::Set(d, following.first_scale), last_scale = hn::Set(d, following.last_scale);
+    const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), scale = hn::Set(d, knot.scale);
     const auto most = hn::Set(d, largest_factor), least = hn::Set(d, 1 / largest_factor);
+    for (size_t at = 0; at < count; at += hn::Lanes(d)) {
+        const Samples recorded = load(knot.then + at), now = load(knot.now + at);
+        const auto then = hn::Mul(recorded.value, scale);
+        const auto noise = hn::LoadU(d, knot.noise + at), difference = hn::Abs(hn::Sub(now.value, then));
+        // NaN is not greater than anything.
+        const auto differs = hn::And(hn::Gt(difference, noise), recorded.is_seen);
+        const auto lit = hn::Max(now.value, zero);
+        const auto quotient = hn::Min(hn::Max(hn::Div(lit, then), least), most);
+        const auto factor =
+            hn::IfThenElse(hn::Gt(then, zero), quotient, hn::IfThenElse(hn::Gt(lit, then), most, least));
+        const auto noise_share = hn::Div(noise, difference);
+        const auto gain = hn::Mul(hn::Sub(one, hn::Mul(noise_share, noise_share)), hn::Sub(factor, one));
+        hn::StoreU(hn::IfThenElse(differs, hn::Div(one, hn::Add(one, gain)), one), d, divisors + at);
+    }
+}
+
+// samples /= the divisor in between
+template <typename Sum>
+void follow_in(const Following& following, Sum* samples) {
+    const Floats d;
+    const auto fraction = hn::Set(d, following.fraction);
     for (const uint32_t block : following.blocks)
         for (size_t at = block * block_samples; at < (block + 1) * block_samples; at += hn::Lanes(d)) {
-            const Samples first = load(following.first + at), last = load(following.last + at);
-            const Samples now = load(following.now + at), sample = load(samples + at);
-            const auto begin = hn::Mul(first.value, first_scale), end = hn::Mul(last.value, last_scale);
-            const auto then = hn::Add(begin, hn::Mul(fraction, hn::Sub(end, begin)));
-            // NaN is not greater than anything.
-            const auto differs = hn::Gt(hn::Abs(hn::Sub(now.value, then)), hn::LoadU(d, following.least + at));
-            const auto is_seen = hn::And(hn::And(first.is_seen, last.is_seen), sample.is_seen);
-            const auto changes = hn::And(differs, is_seen);
-            if (hn::AllFalse(d, changes)) continue;
-            const auto lit = hn::Max(now.value, zero);
-            const auto quotient = hn::Min(hn::Max(hn::Div(lit, then), least), most);
-            const auto factor =
-                hn::IfThenElse(hn::Gt(then, zero), quotient, hn::IfThenElse(hn::Gt(lit, then), most, least));
-            store(changes, hn::Mul(sample.value, factor), samples + at);
+            const auto first = hn::LoadU(d, following.first + at), last = hn::LoadU(d, following.last + at);
+            const auto divisor = hn::Add(first, hn::Mul(fraction, hn::Sub(last, first)));
+            const Samples sample = load(samples + at);
+            store(sample.is_seen, hn::Div(sample.value, divisor), samples + at);
         }
 }
 
-void follow_shorts(const Following<int16_t>& following, int16_t* samples) {
-    follow_in(following, samples);
-}
-void follow_longs(const Following<int32_t>& following, int32_t* samples) {
-    follow_in(following, samples);
-}
-void follow_floats(const Following<float>& following, float* samples) {
-    follow_in(following, samples);
-}
+#define OLS_FOR_KIND(kind, Sum)                                                     \
+    void compare_##kind(const Compared<Sum>& knot, size_t count, float* divisors) { \
+        compare_in(knot, count, divisors);                                          \
+    }                                                                               \
+    void follow_##kind(const Following& following, Sum* samples) {                  \
+        follow_in(following, samples);                                              \
+    }
+OLS_FOR_KIND(shorts, int16_t)
+OLS_FOR_KIND(longs, int32_t)
+OLS_FOR_KIND(floats, float)
+#undef OLS_FOR_KIND
 
 }  // namespace HWY_NAMESPACE
 }  // namespace ols
@@ -131,35 +103,39 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ols {
 
+HWY_EXPORT(compare_shorts);
+HWY_EXPORT(compare_longs);
+HWY_EXPORT(compare_floats);
 HWY_EXPORT(follow_shorts);
 HWY_EXPORT(follow_longs);
 HWY_EXPORT(follow_floats);
 
 namespace {
 
-constexpr double standard_deviations = 6;
+// Of what noise makes of the difference: what is less is taken for noise.
+constexpr double moving_deviations = 1.5, still_deviations = 6;
 
-void follow(const Following<int16_t>& following, int16_t* samples) {
+void compare(const Compared<int16_t>& knot, size_t count, float* divisors) {
+    HWY_DYNAMIC_DISPATCH(compare_shorts)(knot, count, divisors);
+}
+void compare(const Compared<int32_t>& knot, size_t count, float* divisors) {
+    HWY_DYNAMIC_DISPATCH(compare_longs)(knot, count, divisors);
+}
+void compare(const Compared<float>& knot, size_t count, float* divisors) {
+    HWY_DYNAMIC_DISPATCH(compare_floats)(knot, count, divisors);
+}
+void follow(const Following& following, int16_t* samples) {
     HWY_DYNAMIC_DISPATCH(follow_shorts)(following, samples);
 }
-void follow(const Following<int32_t>& following, int32_t* samples) {
+void follow(const Following& following, int32_t* samples) {
     HWY_DYNAMIC_DISPATCH(follow_longs)(following, samples);
 }
-void follow(const Following<float>& following, float* samples) {
+void follow(const Following& following, float* samples) {
     HWY_DYNAMIC_DISPATCH(follow_floats)(following, samples);
 }
 
-// Whether T and T0 may differ by more than `least` somewhere in the interval, for some sample of the block.
-template <typename Sum>
-bool may_change(const Sum* first, const Sum* last, const Sum* now, float first_scale, float last_scale,
-                const float* least) {
-    int changes = 0;
-    for (size_t i = 0; i < block_samples; ++i) {
-        const float here = float(now[i]), begin = first_scale * float(first[i]), end = last_scale * float(last[i]);
-        const float most = std::max(std::abs(begin - here), std::abs(end - here));
-        changes |= int(most > least[i]);
-    }
-    return changes != 0;
+bool is_any(const float* divisors) {
+    return std::any_of(divisors, divisors + block_samples, [](float divisor) { return divisor != 1; });
 }
 
 // The count that stands ten standard deviations of its noise above black: y = 10 (read + shot sqrt y). Masked ones, the least
@@ -198,32 +174,31 @@ std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t in
 }
 
 template <typename Sum>
-FollowedBrightness<Sum>::FollowedBrightness(RowBand<Sum> knots, std::vector<float> light, size_t instant,
-                                            const NoiseModel& noise)
-    : knots_(std::move(knots)), scale_(std::move(light)), instant_(instant), blocks_(knots_.rows() - 1) {
-    for (float& scale : scale_) scale = 1 / scale;
-    const size_t samples = knots_.masked.size(), blocks = (samples + block_samples - 1) / block_samples;
-    const Sum* const now = knots_.row(instant_);
-    least_.assign(blocks * block_samples, std::numeric_limits<float>::infinity());
+FollowedBrightness<Sum>::FollowedBrightness(const RowBand<Sum>& knots, std::span<const float> light, size_t instant,
+                                            const NoiseModel& noise, std::span<const uint8_t> moves)
+    : divisors_(knots.rows()), blocks_(knots.rows() - 1) {
+    const size_t samples = knots.masked.size(), blocks = (samples + block_samples - 1) / block_samples;
+    const Sum* const now = knots.row(instant);
+    std::vector<float> noises(blocks * block_samples, std::numeric_limits<float>::infinity());
     for (size_t p = 0; p < samples; ++p) {
         if (is_masked(now[p])) continue;
         const double sigma = noise.read_counts + noise.shot * std::sqrt(std::max(0.0, double(now[p])));
-        least_[p] = float(standard_deviations * M_SQRT2 * sigma);
+        noises[p] = float((moves[p] ? moving_deviations : still_deviations) * M_SQRT2 * sigma);
+    }
+    for (size_t k = 0; k < divisors_.size(); ++k) {
+        divisors_[k].assign(noises.size(), 1.0f);
+        if (k != instant) compare({knots.row(k), now, 1 / light[k], noises.data()}, noises.size(), divisors_[k].data());
     }
     for (size_t i = 0; i < blocks_.size(); ++i)
-        for (size_t b = 0; b < blocks; ++b) {
-            const size_t at = b * block_samples;
-            if (may_change(knots_.row(i) + at, knots_.row(i + 1) + at, now + at, scale_[i], scale_[i + 1], &least_[at]))
+        for (size_t b = 0; b < blocks; ++b)
+            if (is_any(&divisors_[i][b * block_samples]) || is_any(&divisors_[i + 1][b * block_samples]))
                 blocks_[i].push_back(uint32_t(b));
-        }
 }
 
 template <typename Sum>
-void FollowedBrightness<Sum>::apply(const Alignment::Place& place, RowBand<Sum>& band, size_t row) const {
+void FollowedBrightness<Sum>::apply(const Alignment::Place& place, Sum* samples) const {
     const size_t i = place.interval;
-    follow({blocks_[i], knots_.row(i), knots_.row(i + 1), knots_.row(instant_), least_.data(), scale_[i], scale_[i + 1],
-            std::clamp(place.fraction, 0.0f, 1.0f)},
-           band.row(row));
+    follow({blocks_[i], divisors_[i].data(), divisors_[i + 1].data(), std::clamp(place.fraction, 0.0f, 1.0f)}, samples);
 }
 
 template std::vector<float> relative_light(std::span<const RowBand<int16_t>>, size_t, const NoiseModel&);

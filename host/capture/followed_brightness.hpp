@@ -26,26 +26,29 @@ std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t in
 //
 // Light that all pixels have more or less of is the lamps' in the tracking slots, not the subject's: it is taken out before.
 //
-// T between two tracking frames is linear in time. Samples stay to the bit where T and T0 differ by less than six standard
-// deviations of the camera's noise in their difference, and where either is not known. The factor stays within 1/4 and 4,
-// as the sample's noise is multiplied with it.
+// It mends interpolation, too: what a warp smears in the sample it smears in T.
+//
+// Of the difference d = T0 - T, noise is likely to be a part: at a tracking frame's time samples are multiplied by
+// 1 + g (T0 / T - 1) with g = 1 - (n / d)^2, and not at all where |d| <= n; n is 1.5 standard deviations of the camera's noise in d,
+// 6 where nothing moves, so that there hardly a sample is touched for nothing. With one standard deviation that is the Wiener filter's
+// gain. In between the factor's inverse is linear in time, as T is. Samples stay to the bit where it is 1, and it is 1 where T or T0 is not known. T0 / T
+// stays within 1/4 and 4, as the sample's noise is multiplied with it.
 template <typename Sum>
 class FollowedBrightness {
   public:
     // `knots`: the same band as the samples; a row for each knot of the alignment, its tracking frame's samples brought to the
-    // target, in counts above black. `light`: relative_light() of the knots. `instant`: the target's own.
-    FollowedBrightness(RowBand<Sum> knots, std::vector<float> light, size_t instant, const NoiseModel& noise);
+    // target, in counts above black. `light`: relative_light() of the knots. `instant`: the target's own. `moves`: of each sample, not 0
+    // where it moves (Alignment::moves()).
+    FollowedBrightness(const RowBand<Sum>& knots, std::span<const float> light, size_t instant, const NoiseModel& noise,
+                       std::span<const uint8_t> moves);
 
-    // Row `row` of a band of the same size: a slot's samples, brought to the target. Masked ones stay. Integers are rounded, half
+    // A slot's samples in the band, brought to the target, padded to a multiple of 16. Masked ones stay. Integers are rounded, half
     // away from zero, and held to what the inversion takes: 16383 of shorts, 2^23 - 1 of others. The same bits on every SIMD
     // path.
-    void apply(const Alignment::Place& place, RowBand<Sum>& band, size_t row) const;
+    void apply(const Alignment::Place& place, Sum* samples) const;
 
   private:
-    RowBand<Sum> knots_;
-    std::vector<float> scale_;  // by knot: brings its samples to the target's light
-    size_t instant_;
-    std::vector<float> least_;  // of each sample: the difference that counts; infinite where T0 is not known
+    std::vector<std::vector<float>> divisors_;   // by knot, of each sample: the factor's inverse
     std::vector<std::vector<uint32_t>> blocks_;  // by interval: blocks of samples of which some may change within
 };
 

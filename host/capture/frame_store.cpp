@@ -38,7 +38,10 @@ TargetFrames FrameStore::around(uint32_t index, uint64_t target) const {
     TargetFrames frames;
     frames.index = index;
     frames.basis = gather_basis(sequence_, target, [this](uint64_t number) { return has(number); });
-    for (const auto& choice : frames.basis.choices) frames.frames.push_back(find(choice.number));
+    for (const auto& choice : frames.basis.choices) {
+        frames.frames.push_back(find(choice.number));
+        frames.across.push_back(choice.across ? find(*choice.across) : nullptr);
+    }
     const FrameRange range = frames_around(sequence_, target);
     for (uint64_t number = range.first; number <= range.last; ++number) {
         if (sequence_.slots[number % sequence_.slots.size()].kind != SlotKind::tracking) continue;

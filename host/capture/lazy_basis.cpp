@@ -86,10 +86,11 @@ LazyBasis gather_basis(const Sequence& sequence, uint64_t target, const std::fun
     for (size_t s = 0; s < sequence.slots.size(); ++s) {
         if (sequence.slots[s].kind != SlotKind::basis) continue;
         const Nearest at = nearest_of(sequence, target, s);
+        const auto other = at.other && is_recorded(*at.other) ? at.other : std::nullopt;
         if (at.nearest && is_recorded(*at.nearest))
-            basis.choices.push_back({*at.nearest, int(s), false});
-        else if (at.other && is_recorded(*at.other))
-            basis.choices.push_back({*at.other, int(s), true});
+            basis.choices.push_back({*at.nearest, int(s), false, other});
+        else if (other)
+            basis.choices.push_back({*other, int(s), true, {}});
         else
             basis.lost.push_back(int(s));
     }

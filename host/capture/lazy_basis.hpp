@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "result.hpp"
@@ -25,13 +26,16 @@ Result<int> tracking_frames_a_target(const Sequence& sequence, double fps);
 std::vector<uint64_t> target_numbers(const Sequence& sequence, int every);
 
 // The frames that a target's samples come from. Of each basis slot the frame nearest in time, half a cycle away at most, the
-// earlier of two: for the paper's cycle of 1/12 s from 1/24 s before the target to 1/24 s after. Where it was lost, the
-// same slot's frame in the cycle on the target's other side, a cycle away at most.
+// earlier of two: for the paper's cycle of 1/12 s from 1/24 s before the target to 1/24 s after. Across the target, a cycle away
+// at most, lies the same slot's frame of another cycle: it stands in where the nearer one was lost, and may be blended with it
+// (slot_interpolation.hpp).
 struct LazyBasis {
     struct Choice {
         uint64_t number = 0;
         int slot = 0;              // of the cycle
         bool is_stand_in = false;  // for a lost one
+        std::optional<uint64_t>
+            across;  // number of the slot's frame on the target's other side, if recorded; none of a stand-in
     };
     uint64_t target = 0;
     std::vector<Choice> choices;  // in slot order

@@ -64,8 +64,9 @@ class MatteMean {
         rows_.alignment = job.alignment;
         for_each_index(job.threads, job.frames.size(), [&](size_t i) {
             const Frame& frame = *job.frames[i].frame;
-            rows_.rows[i].push_back({std::make_shared<SignalPlanes<Sample>>(signal_planes(frame, black, true)),
-                                     job.alignment->place_of(middle_tick(frame))});
+            rows_.rows[i].push_back(
+                {.nearer = {std::make_shared<SignalPlanes<Sample>>(signal_planes(frame, black, true)),
+                            job.alignment->place_of(middle_tick(frame))}});
         });
     }
 
@@ -121,7 +122,7 @@ class MatteMean {
     template <bool trusted>
     void add_rows(const RowBand<Sum>& band, const Band& place, Means& means) const {
         for (size_t i = 0; i < band.rows(); ++i) {
-            const auto& confidence = job_.alignment->confidence(rows_.rows[i][0].place.interval);
+            const auto& confidence = job_.alignment->confidence(rows_.rows[i][0].nearer.place.interval);
             add<trusted>(band.row(i), confidence.data() + place.first_pixel(), float(job_.weights[i]), means);
         }
     }

@@ -91,13 +91,15 @@ double MotionDeveloper::instant_of(const TargetFrames& frames, const Sequence& s
            (double(frames.basis.target) - double(nearest->number)) * double(sequence.slots.front().period_ticks);
 }
 
-MotionDeveloper::Reach MotionDeveloper::reach_of(const TargetFrames& frames) {
-    Reach reach{middle_tick(*frames.frames.front()), middle_tick(*frames.frames.front())};
+TrackingFlows::Reach MotionDeveloper::reach_of(const TargetFrames& frames, bool with_across) {
+    TrackingFlows::Reach reach{middle_tick(*frames.frames.front()), middle_tick(*frames.frames.front())};
     const auto include = [&](const Frame& frame) {
         reach.from = std::min(reach.from, middle_tick(frame));
         reach.to = std::max(reach.to, middle_tick(frame));
     };
     for (const auto& frame : frames.frames) include(*frame);
+    for (const auto& frame : frames.across)
+        if (with_across && frame) include(*frame);
     for (const MatteFrame& one : frames.matte) include(*one.frame);
     return reach;
 }
@@ -117,10 +119,11 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
         if (!added.ok()) return added.error();
         last_tracking_ = fresh[i]->number;
     }
-    const auto [from, to] = reach_of(frames);
-    if (frames.tracking.empty()) return still_path(from, int(frames.frames[0]->width), int(frames.frames[0]->height));
-    flows_.forget_before(from);
-    return flows_.path(instant_of(frames, sequence_), from, to);
+    const auto reach = reach_of(frames, quality_.interpolates);
+    if (frames.tracking.empty())
+        return still_path(reach.from, int(frames.frames[0]->width), int(frames.frames[0]->height));
+    flows_.forget_before(reach.from);
+    return flows_.path(instant_of(frames, sequence_), reach, reach_of(frames, false));
 }
 
 template <typename Sample, typename Sum>
@@ -139,7 +142,7 @@ void MotionDeveloper::follow_brightness(const TargetFrames& frames, const Motion
         const auto found = frame_at(path[k]);
         if (found == frames.tracking.end()) return;
         auto planes = std::make_shared<SignalPlanes<Sample>>(signal_planes<Sample>(*found->frame, black, false));
-        tracking->rows[k] = {{std::move(planes), aligned.alignment->place_of(path[k].tick)}};
+        tracking->rows[k].push_back({.nearer = {std::move(planes), aligned.alignment->place_of(path[k].tick)}});
     });
     aligned.instant = size_t(instant - path.begin());
     aligned.tracking_light = light_of(*tracking, *frames.frames.front(), calibration_.black, aligned.instant, noise_);
@@ -147,30 +150,60 @@ void MotionDeveloper::follow_brightness(const TargetFrames& frames, const Motion
     aligned.noise = noise_;
 }
 
+// The planes of all frames that the target is made of, those of the last one kept.
+template <typename Sample>
+void MotionDeveloper::prepare_planes(const TargetFrames& frames, Ready<Sample>& ready) const {
+    const Frame& like = *frames.frames.front();
+    if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
+    std::vector<std::pair<uint64_t, const Frame*>> needed;
+    for (size_t i = 0; i < frames.frames.size(); ++i) {
+        needed.emplace_back(frames.basis.choices[i].number, frames.frames[i].get());
+        if (quality_.interpolates && frames.across[i])
+            needed.emplace_back(*frames.basis.choices[i].across, frames.across[i].get());
+    }
+    std::vector<std::shared_ptr<const SignalPlanes<Sample>>> planes(needed.size());
+    for_each_index(options_.threads, needed.size(), [&](size_t i) {
+        const auto& [number, frame] = needed[i];
+        const auto found = ready.planes.find(number);
+        planes[i] = found != ready.planes.end() ? found->second
+                                                : std::make_shared<SignalPlanes<Sample>>(signal_planes<Sample>(
+                                                      *frame, *ready.black, developer_.keeps_clipped()));
+    });
+    ready.planes.clear();
+    for (size_t i = 0; i < needed.size(); ++i) ready.planes[needed[i].first] = std::move(planes[i]);
+}
+
 template <typename Sample, typename Sum>
 AlignedRows<Sample, Sum> MotionDeveloper::align(const TargetFrames& frames, const MotionPath& path,
                                                 std::shared_ptr<const Alignment> alignment, Ready<Sample>& ready) {
     const Stopwatch watch(times_.planes);
+    prepare_planes(frames, ready);
     AlignedRows<Sample, Sum> aligned;
     aligned.rows.resize(size_t(sequence_.basis.rows));
     aligned.masks_untrusted = has_prior(options_.estimate);
-    const Frame& like = *frames.frames.front();
-    if (!ready.black) ready.black = black_planes<Sample>(calibration_.black, like.cfa, like.format);
-    std::vector<std::shared_ptr<const SignalPlanes<Sample>>> planes(frames.frames.size());
-    for_each_index(options_.threads, planes.size(), [&](size_t i) {
-        const auto found = ready.planes.find(frames.basis.choices[i].number);
-        if (found != ready.planes.end())
-            planes[i] = found->second;
-        else
-            planes[i] = std::make_shared<SignalPlanes<Sample>>(
-                signal_planes<Sample>(*frames.frames[i], *ready.black, developer_.keeps_clipped()));
-    });
-    ready.planes.clear();
-    for (size_t i = 0; i < planes.size(); ++i) {
+    const double instant = std::ranges::find_if(path, &MotionKnot::is_instant)->tick;
+    // Beyond the path flow would have to go on as it did last, for longer than it is known.
+    const auto is_reached = [&](const Frame& frame) {
+        return path.front().tick <= middle_tick(frame) && middle_tick(frame) <= path.back().tick;
+    };
+    std::map<std::pair<size_t, size_t>, std::shared_ptr<const std::vector<float>>> trusts;
+    const auto recorded = [&](uint64_t number, const Frame& frame) {
+        return typename AlignedRows<Sample, Sum>::Recorded{ready.planes.at(number),
+                                                           alignment->place_of(middle_tick(frame))};
+    };
+    for (size_t i = 0; i < frames.frames.size(); ++i) {
         const LazyBasis::Choice& choice = frames.basis.choices[i];
-        ready.planes[choice.number] = planes[i];
-        aligned.rows[size_t(sequence_.slots[size_t(choice.slot)].row)].push_back(
-            {planes[i], alignment->place_of(middle_tick(*frames.frames[i]))});
+        typename AlignedRows<Sample, Sum>::Source source{.nearer = recorded(choice.number, *frames.frames[i])};
+        if (quality_.interpolates && frames.across[i] && is_reached(*frames.across[i])) {
+            auto across = recorded(*choice.across, *frames.across[i]);
+            const size_t here = source.nearer.place.interval, there = across.place.interval;
+            auto& trust = trusts[{here, there}];
+            if (!trust) trust = std::make_shared<std::vector<float>>(trust_across(*alignment, here, there));
+            const double near = std::abs(middle_tick(*frames.frames[i]) - instant),
+                         far = std::abs(middle_tick(*frames.across[i]) - instant);
+            source.across = {std::move(across), trust, float(far / (near + far))};
+        }
+        aligned.rows[size_t(sequence_.slots[size_t(choice.slot)].row)].push_back(std::move(source));
     }
     aligned.alignment = std::move(alignment);
     follow_brightness(frames, path, *ready.black, aligned);
@@ -234,6 +267,9 @@ Result<Target> MotionDeveloper::develop(const TargetFrames& frames, const Motion
         return developer_.develop(*aligned, frames.basis.lost);
     }();
     if (!target.ok()) return target;
+    if (quality_.interpolates)
+        target->provenance["slots_from_both_sides"] =
+            std::visit([](const auto& rows) { return rows.blended_sources(); }, aligned->rows);
     target->motion = motion_around(path ? *path : *found, quality_.motion_reach_s, *target);
     target->matte = matte_of(frames, std::visit([](const auto& rows) { return rows.alignment; }, aligned->rows));
     return target;

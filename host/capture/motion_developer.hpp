@@ -19,6 +19,7 @@ struct TargetFrames {
     uint32_t index = 0;  // of the target
     LazyBasis basis;
     std::vector<std::shared_ptr<const Frame>> frames;  // by basis.choices
+    std::vector<std::shared_ptr<const Frame>> across;  // the same, of the target's other side; null where there is none
     // The tracking frames that were recorded in frames_around(), in order. A target's may be among them or lost.
     struct Tracking {
         uint64_t number = 0;
@@ -62,11 +63,9 @@ class MotionDeveloper {
     // The middle of the target's tracking exposure, in ticks; where that frame was lost, by its neighbours' word.
     static double instant_of(const TargetFrames& frames, const Sequence& sequence);
 
-    // The middles of the first and the last exposure that are brought to the target, in ticks: of basis and matte frames.
-    struct Reach {
-        double from, to;
-    };
-    static Reach reach_of(const TargetFrames& frames);
+    // The middles of the first and the last exposure that are brought to the target: of basis and matte frames, with those across
+    // the target that are blended or without.
+    static TrackingFlows::Reach reach_of(const TargetFrames& frames, bool with_across);
 
   private:
     // The frames of the last target, ready to be warped.
@@ -77,6 +76,8 @@ class MotionDeveloper {
     };
 
     Result<MotionPath> find_path(const TargetFrames& frames);
+    template <typename Sample>
+    void prepare_planes(const TargetFrames& frames, Ready<Sample>& ready) const;
     template <typename Sample, typename Sum>
     AlignedRows<Sample, Sum> align(const TargetFrames& frames, const MotionPath& path,
                                    std::shared_ptr<const Alignment> alignment, Ready<Sample>& ready);

@@ -12,8 +12,15 @@ std::vector<MotionQuality> presets() {
     const FlowOptions quick{DisFlowOptions{.finest_scale = 0, .patch_stride = 5, .iterations = 12, .refinements = 0}};
     return {{},
             {"preview", true, {.local = quick, .refinement = {}, .reduced_side = 120}, 0.8f},
-            {"standard", true, {.local = method("brox-half"), .refinement = method("refine-half")}},
-            {"final", true, {.local = method("robust"), .refinement = method("refine-robust")}, 0.05f}};
+            {.name = "standard",
+             .compensates = true,
+             .flow = {.local = method("brox-half"), .refinement = method("refine-half")},
+             .interpolates = true},
+            {.name = "final",
+             .compensates = true,
+             .flow = {.local = method("robust"), .refinement = method("refine-robust")},
+             .line_tolerance_steps = 0.05f,
+             .interpolates = true}};
 }
 
 }  // namespace

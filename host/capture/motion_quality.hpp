@@ -21,6 +21,9 @@ struct MotionQuality {
     // Whether samples follow the brightness of the tracking frames where alignment leaves it different
     // (capture/followed_brightness.hpp).
     bool follows_brightness = true;
+    // Whether slots are blended of their frames before and after the target, or taken from the nearer one
+    // (capture/slot_interpolation.hpp).
+    bool interpolates = false;
     // The motion before and after a target that goes with it into the archive, for motion blur: a shutter of 360 degrees at 24
     // targets a second.
     double motion_reach_s = 1 / 48.0;

@@ -41,6 +41,9 @@ class RowBand {
     std::vector<uint8_t> masked;
     std::vector<float> black_rest;  // of each sample: what is left of the black level in every row, |rest| <= 0.5
     std::vector<float> white;       // of each sample: the count above black at which it saturates
+    // Of each sample, padded to a multiple of 16: what the variance of its noise differs from a recorded count's, summed over the
+    // rows, as a share of it; empty where nothing was blended.
+    std::vector<float> noise;
 
   private:
     size_t rows_, pitch_;

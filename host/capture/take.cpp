@@ -264,7 +264,8 @@ nlohmann::json describe_motion(const Sequence& sequence, const TakeTargets& targ
     return {{"quality", targets.quality.name},
             {"tracking_frames_a_target", targets.every},
             {"tracking_rate_hz", tracking_rate_hz(sequence)},
-            {"reach_ms", 1e3 * half_cycle_s}};  // of the basis, before and after a target
+            // Of the basis, before and after a target.
+            {"reach_ms", 1e3 * half_cycle_s * (targets.quality.interpolates ? 2 : 1)}};
 }
 
 }  // namespace

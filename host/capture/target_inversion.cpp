@@ -150,6 +150,9 @@ class BandInversion {
         prepare_gain();
         const std::vector<uint32_t> masked = job_.fills ? masked_samples(loaded.masked) : std::vector<uint32_t>();
         std::vector<float> variance = masked.empty() ? solve(loaded, gain_, lamps_) : solve_with_masked(loaded, masked);
+        // The rows taken as equal in weight.
+        for (size_t p = 0; p < variance.size() && !loaded.noise.empty(); ++p)
+            variance[p] *= 1 + loaded.noise[p] / float(loaded.rows());
         if (!sample_fills_.empty()) note_fills(variance);
         // Of the colours of a pixel, their mean.
         for (size_t p = 0; p < variance.size(); ++p)

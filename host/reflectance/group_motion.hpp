@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -61,6 +62,16 @@ class GroupMotion {
     const OwnVectors* own_vectors(int run, int y) const {
         const int32_t index = own_index_[size_t(y) * size_t(runs_) + size_t(run)];
         return index < 0 ? nullptr : &own_[size_t(index)];
+    }
+
+    // Whether a run lies on a line along which nothing moves, at any fraction of the step.
+    bool is_still(int run, int y) const {
+        const size_t at = size_t(y) * size_t(runs_) + size_t(run);
+        float sum = 0;  // NaN where it is no line
+        for (const auto* part : {&lines_.base_u, &lines_.base_du, &lines_.base_v, &lines_.base_dv, &lines_.step_u,
+                                 &lines_.step_du, &lines_.step_v, &lines_.step_dv})
+            sum += std::abs((*part)[at]);
+        return sum == 0;
     }
 
     // The vectors of row y at a fraction of the step: grid().width values each.

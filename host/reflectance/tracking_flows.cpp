@@ -135,11 +135,10 @@ Status TrackingFlows::find_local_flows(size_t first, size_t last) {
     return first_error(errors);
 }
 
-// Adds the knots from frame `at`, where `flow` leads and `back` comes from, to frame `end`. `reference` is the instant's own
-// frame, which long-range flows are refined against, null where there is none.
-Status TrackingFlows::walk(const Frame* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
-                           MotionPath& path) const {
-    for (;;) {
+// Adds the knots from frame `at`, where `flow` leads and `back` comes from, to frame `end`.
+Status TrackingFlows::walk(Walk walk, FlowField flow, FlowField back, MotionPath& path) const {
+    const auto& [reference, refined, direction, from, end] = walk;
+    for (size_t at = from;; at = direction > 0 ? at + 1 : at - 1) {
         const Frame& here = frames_[at];
         path.push_back({here.tick, flow,
                         reference && reference->evenness && here.evenness
@@ -147,20 +146,20 @@ Status TrackingFlows::walk(const Frame* reference, int direction, size_t end, si
                             : confidence(flow, back),
                         false});
         if (at == end) return Done{};
-        const Frame& pair = frames_[direction > 0 ? at : at - 1];
+        const Frame &pair = frames_[direction > 0 ? at : at - 1], &next = frames_[direction > 0 ? at + 1 : at - 1];
         const FlowField &away = *(direction > 0 ? pair.forward : pair.backward),
                         &home = *(direction > 0 ? pair.backward : pair.forward);
         flow = concatenated(flow, away);
         back = concatenated(home, back);
-        at = direction > 0 ? at + 1 : at - 1;
-        if (!reference || !options_.refinement) continue;
-        auto refined = estimate_flow(reference->image, frames_[at].image, *options_.refinement, &flow);
-        if (!refined.ok()) return refined.error();
-        flow = std::move(*refined);
+        const bool is_near = refined.from < here.tick && here.tick < refined.to;
+        if (!reference || !options_.refinement || !is_near) continue;
+        auto mended = estimate_flow(reference->image, next.image, *options_.refinement, &flow);
+        if (!mended.ok()) return mended.error();
+        flow = std::move(*mended);
     }
 }
 
-Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
+Result<MotionPath> TrackingFlows::path(double instant, const Reach& reach, const Reach& refined) {
     if (frames_.empty()) return fail("no tracking frame of the take was recorded: motion cannot be compensated");
     if (instant < frames_.front().tick || instant > frames_.back().tick)
         return MotionPath{still(instant, width_, height_)};
@@ -170,9 +169,9 @@ Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
         return i;
     };
     const size_t before = last_until(instant);
-    const size_t first = std::min(before, last_until(from));
-    size_t last = last_until(to);
-    if (frames_[last].tick < to && last + 1 < frames_.size()) ++last;
+    const size_t first = std::min(before, last_until(reach.from));
+    size_t last = last_until(reach.to);
+    if (frames_[last].tick < reach.to && last + 1 < frames_.size()) ++last;
     const bool is_frame = frames_[before].tick == instant;
     last = std::max(last, is_frame ? before : before + 1);
     if (Status status = find_local_flows(first, last); !status.ok()) return status.error();
@@ -187,7 +186,8 @@ Result<MotionPath> TrackingFlows::path(double instant, double from, double to) {
     MotionPath sides[2];
     std::string errors[2];
     const auto take = [&](size_t side, const Frame* own, size_t end, size_t at, FlowField flow, FlowField back) {
-        const Status walked = walk(own, side == 0 ? -1 : 1, end, at, std::move(flow), std::move(back), sides[side]);
+        const Status walked =
+            walk({own, refined, side == 0 ? -1 : 1, at, end}, std::move(flow), std::move(back), sides[side]);
         if (!walked.ok()) errors[side] = walked.error().message;
     };
     for_each_index(options_.threads, 2, [&](size_t side) {

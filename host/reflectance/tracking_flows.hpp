@@ -16,7 +16,7 @@ namespace ols {
 struct TrackingFlowOptions {
     FlowOptions local;  // between neighbouring tracking frames, both ways
     // Of a long-range flow, which a concatenation begins: directly between the target's tracking frame and one that is
-    // farther away. Nothing: concatenations stand as they are.
+    // farther away. Nothing: concatenations stand as they are. Saturation is `local`'s.
     std::optional<FlowOptions> refinement;
     // Flow is found in images a half or a quarter as large, while their shorter side keeps this many pixels; 0: in images as they
     // are.
@@ -53,11 +53,17 @@ class TrackingFlows {
     void forget_before(double tick);
     size_t frames() const { return frames_.size(); }  // that are kept
 
-    // From the instant to the tracking frames from the last at or before `from` to the first at or after `to`, as far as
-    // there are any. The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to
+    // Times in ticks.
+    struct Reach {
+        double from, to;
+    };
+    // From the instant to the tracking frames from the last at or before reach.from to the first at or after reach.to, as far
+    // as there are any; those that are needed for times within `refined` are refined, what lies farther stands as it is concatenated.
+    // The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to
     // move evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with
     // itself. Flows between neighbours are kept for the next instant.
-    Result<MotionPath> path(double instant, double from, double to);
+    Result<MotionPath> path(double instant, const Reach& reach, const Reach& refined);
+    Result<MotionPath> path(double instant, double from, double to) { return path(instant, {from, to}, {from, to}); }
 
   private:
     struct Frame {
@@ -68,8 +74,14 @@ class TrackingFlows {
     };
 
     Status find_local_flows(size_t first, size_t last);
-    Status walk(const Frame* reference, int direction, size_t end, size_t at, FlowField flow, FlowField back,
-                MotionPath& path) const;
+    struct Walk {
+        const Frame*
+            reference;  // the instant's own frame, which long-range flows are refined against; null where there is none
+        Reach refined;
+        int direction;
+        size_t at, end;
+    };
+    Status walk(Walk walk, FlowField flow, FlowField back, MotionPath& path) const;
 
     const TrackingFlowOptions options_;
     int reduction_ = 1, width_ = 0, height_ = 0;  // of the images that flow is found in

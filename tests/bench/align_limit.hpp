@@ -18,19 +18,28 @@ class AlignLimit {
     // more from any other, where outlines have no say.
     enum class Where { visible, inside };
 
-    // When every pixel is taken from where `path` leads (bilinear).
-    double moved_db(const MotionPath& path, Where where) const;
+    // When every pixel is taken from where `path` leads (bilinear); or blended with the moment a cycle away across the target, where
+    // its point is visible there, linearly in time.
+    double moved_db(const MotionPath& path, Where where, bool interpolates) const;
     // As the pictures stand.
     double still_db(Where where) const;
 
   private:
+    struct Moment {
+        double tick;  // from the target's
+        Image image;
+        std::vector<unsigned char> visible, inside;
+    };
+    // Of the moments half a cycle away at most.
     template <typename Moved>
     double psnr_db(const Moved& moved, Where where) const;
+    Image moved(const Moment& moment, const MotionPath& path) const;
+    const Moment* across(const Moment& moment) const;
 
+    double cycle_ticks_;
     Image truth_;
     double peak_;
-    std::vector<Image> others_;                                 // by knot; the instant's is empty
-    std::vector<std::vector<unsigned char>> visible_, inside_;  // by knot
+    std::vector<Moment> moments_;  // the target's is not among them
 };
 
 }  // namespace ols

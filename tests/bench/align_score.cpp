@@ -140,7 +140,7 @@ double TrueTarget::images_percent(const Target& target, const std::vector<unsign
 MotionPath true_path(const Recording& recording, size_t target) {
     const TargetFrames& frames = recording.targets[target];
     const double at_us = recording.target_us(target), at_tick = MotionDeveloper::instant_of(frames, recording.sequence);
-    const auto [from, to] = MotionDeveloper::reach_of(frames);
+    const auto [from, to] = MotionDeveloper::reach_of(frames, true);
     MotionPath path;
     for (const TargetFrames::Tracking& one : frames.tracking) {
         const double tick = middle_tick(*one.frame);
@@ -171,20 +171,41 @@ Result<MotionPath> found_path(const Recording& recording, size_t target, const M
                       tracking_noise(*one.frame, calibration.black, calibration.flat, recording.camera().noise));
         if (!added) return added.error();
     }
-    const auto [from, to] = MotionDeveloper::reach_of(frames);
-    return flows.path(MotionDeveloper::instant_of(frames, recording.sequence), from, to);
+    return flows.path(MotionDeveloper::instant_of(frames, recording.sequence),
+                      MotionDeveloper::reach_of(frames, quality.interpolates),
+                      MotionDeveloper::reach_of(frames, false));
 }
 
-PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots,
+namespace {
+
+// The knot half a cycle from the target, a tracking frame more at most: before it (side -1) or after it (side 1).
+size_t half_a_cycle_from(const MotionPath& path, size_t instant, int side, double half_ticks) {
+    size_t k = instant;
+    const auto is_last = [&] { return side < 0 ? k == 0 : k + 1 == path.size(); };
+    while (!is_last() && std::abs(path[k].tick - path[instant].tick) < half_ticks - 1) k = size_t(int(k) + side);
+    return k;
+}
+
+size_t instant_of(const MotionPath& path) {
+    return size_t(std::ranges::find_if(path, &MotionKnot::is_instant) - path.begin());
+}
+
+}  // namespace
+
+PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots, double cycle_ticks,
                      const std::vector<unsigned char>& subject) {
-    assert(!found || found->size() == truth.size());
-    const auto instant = size_t(std::ranges::find_if(truth, &MotionKnot::is_instant) - truth.begin());
-    const bool is_near = knots == Knots::nearest;
+    const size_t instant = instant_of(truth);
     std::vector<float> errors;
-    for (const size_t k : {is_near ? instant - 1 : 0, is_near ? instant + 1 : truth.size() - 1}) {
+    for (const int side : {-1, 1}) {
+        const size_t k = knots == Knots::nearest ? size_t(int(instant) + side)
+                                                 : half_a_cycle_from(truth, instant, side, cycle_ticks / 2);
         const FlowField& exact = truth[k].flow;
         FlowField estimate(exact.width, exact.height);
-        if (found) estimate = resized((*found)[k].flow, exact.width, exact.height);
+        if (found) {
+            const auto same = std::ranges::find(*found, truth[k].tick, &MotionKnot::tick);
+            assert(same != found->end());
+            estimate = resized(same->flow, exact.width, exact.height);
+        }
         for (size_t p = 0; p < exact.size(); ++p)
             if (subject[p] && truth[k].confidence[p] > 0)
                 errors.push_back(std::hypot(estimate.u[p] - exact.u[p], estimate.v[p] - exact.v[p]));
@@ -194,8 +215,10 @@ PathError path_error(const MotionPath* found, const MotionPath& truth, Knots kno
     return {sum / double(errors.size()), percentile(std::move(errors), 0.95)};
 }
 
-CycleMotion cycle_motion(const MotionPath& truth, const std::vector<unsigned char>& subject) {
-    const FlowField &first = truth.front().flow, &last = truth.back().flow;
+CycleMotion cycle_motion(const MotionPath& truth, double cycle_ticks, const std::vector<unsigned char>& subject) {
+    const size_t instant = instant_of(truth);
+    const FlowField &first = truth[half_a_cycle_from(truth, instant, -1, cycle_ticks / 2)].flow,
+                    &last = truth[half_a_cycle_from(truth, instant, 1, cycle_ticks / 2)].flow;
     CycleMotion motion;
     double sum = 0, count = 0;
     for (size_t p = 0; p < subject.size(); ++p) {

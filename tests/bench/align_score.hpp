@@ -61,20 +61,20 @@ class TrueTarget {
 // the nearest surface's flow; confidence is 1 where the point is visible at both ends, else 0.
 MotionPath true_path(const Recording& recording, size_t target);
 
-// The endpoint error in pixels of a found path's knots nearest to the target, or farthest from it, on either side, over the
+// The endpoint error in pixels of a found path's knots next to the target, or half a cycle from it, on either side, over the
 // subject's pixels that are visible there. `found` null: of no flow, which is the length of the true one.
 struct PathError {
     double mean = 0, percentile_95 = 0;
 };
-enum class Knots { nearest, farthest };
-PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots,
+enum class Knots { nearest, half_a_cycle };
+PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots, double cycle_ticks,
                      const std::vector<unsigned char>& subject);
 
-// How far the subject's pixels go from the path's first knot to its last, which is a cycle.
+// How far the subject's pixels go from half a cycle before the target to half a cycle after it.
 struct CycleMotion {
     double mean_px = 0, most_px = 0;
 };
-CycleMotion cycle_motion(const MotionPath& truth, const std::vector<unsigned char>& subject);
+CycleMotion cycle_motion(const MotionPath& truth, double cycle_ticks, const std::vector<unsigned char>& subject);
 
 // The subject's pixels that move by more than a quarter of a pixel from the target to any knot, or are hidden there.
 std::vector<unsigned char> moving_pixels(const MotionPath& truth, const std::vector<unsigned char>& subject);

@@ -11,10 +11,10 @@ namespace ols {
 
 namespace {
 
-// The motion of the lids is at its height in the first cycle.
+// The motion of the lids is at its height in the second cycle.
 RecordingPlan plan_of(const std::string& scene, const std::string& basis, int width, int height, int targets) {
     return {
-        "tools/stagesim/scenes/motion_" + scene + ".toml", basis, width, height, scene == "blink" ? 0u : 2u, targets};
+        "tools/stagesim/scenes/motion_" + scene + ".toml", basis, width, height, scene == "blink" ? 1u : 2u, targets};
 }
 
 bool same_frames(const std::vector<TargetFrames::Tracking>& a, const std::vector<TargetFrames::Tracking>& b) {
@@ -25,7 +25,8 @@ bool same_frames(const std::vector<TargetFrames::Tracking>& a, const std::vector
 }
 
 Status check_motion(const MovingScene& scene, const Take& take) {
-    const CycleMotion motion = cycle_motion(take.true_path, take.truth->subject());
+    const CycleMotion motion =
+        cycle_motion(take.true_path, double(take.recording.sequence.cycle_ticks()), take.truth->subject());
     const double scale = take.plan.width / 320.0;
     const auto agrees = [&](double stated, double measured) {
         return std::abs(stated - measured / scale) <= 0.1 * stated;

@@ -30,19 +30,27 @@ Value sure(Result<Value> value) {
     std::exit(1);
 }
 
-constexpr const char* flow_only = "flow only";  // standard, whose samples do not follow the brightness
+// `standard` with flow alone: from the nearer frames, as they are; and with these, following the brightness.
+constexpr const char* flow_only = "flow only";
+constexpr const char* nearer_only = "nearer only";
 
-std::unique_ptr<MotionDeveloper> developer(const Recording& recording, const std::string& name) {
+std::string quality_of(const std::string& way) {
+    return way == flow_only || way == nearer_only ? "standard" : way;
+}
+
+std::unique_ptr<MotionDeveloper> developer(const Recording& recording, const std::string& name, Estimate estimate) {
     DevelopOptions options;
     options.threads = 1;
-    MotionQuality quality = *motion_quality(name == flow_only ? "standard" : name);
+    options.estimate = estimate;
+    MotionQuality quality = *motion_quality(quality_of(name));
     quality.follows_brightness = name != flow_only;
+    quality.interpolates = quality.interpolates && name == quality_of(name);
     return std::make_unique<MotionDeveloper>(recording.sequence, recording.calibration, recording.camera().noise,
                                              options, quality);
 }
 
 Target first_target(const Recording& recording, const std::string& quality, const MotionPath* path = nullptr) {
-    return sure(developer(recording, quality)->develop(recording.targets[0], path));
+    return sure(developer(recording, quality, Estimate::clipped)->develop(recording.targets[0], path));
 }
 
 // 100 at a PSNR of 0 dB.
@@ -77,7 +85,7 @@ void measure(Bench& bench, const Line& line) {
 // The targets of one take by setting, each developed once. Empty where nothing is measured.
 using Targets = std::vector<std::pair<std::string, Target>>;
 
-constexpr const char* ways[] = {"none", flow_only, "preview", "standard", "final", "true flow", "frozen"};
+constexpr const char* ways[] = {"none", flow_only, nearer_only, "preview", "standard", "final", "true flow", "frozen"};
 
 Targets develop_all(Takes& takes, const Take& take) {
     Targets targets;
@@ -89,8 +97,7 @@ Targets develop_all(Takes& takes, const Take& take) {
         else if (way == "frozen")
             targets.push_back({way, first_target(*take.frozen, "none")});
         else
-            targets.push_back(
-                {way, first_target(take.recording, way, sure(takes.found(take, way == flow_only ? "standard" : way)))});
+            targets.push_back({way, first_target(take.recording, way, sure(takes.found(take, quality_of(way))))});
     }
     return targets;
 }
@@ -110,9 +117,11 @@ void measure_relit(Bench& bench, const std::string& name, const Take* take, cons
         .note =
             "**What is relit.** After each scene's name the subject's motion at 320 x 240: the mean and the most "
             "pixels "
-            "a cycle. Left to right: as recorded, `standard` without following the tracking frames' brightness "
-            "([motion.md](motion.md)), the qualities, the scene's own geometry in place of a flow, and a "
-            "subject that stands still in the target's pose: noise alone, the most that there is to gain.",
+            "a cycle. Left to right: as recorded; `standard` with flow alone, then following the tracking frames' "
+            "brightness, both from the frames nearest in time only ([motion.md](motion.md)); the qualities; `final` "
+            "with "
+            "the scene's own geometry in place of a flow; and a subject that stands still in the target's pose: noise "
+            "and saturation alone, the most that there is to gain.",
         .figures = {}};
     measure_targets(bench, line, targets,
                     [&](const Target& target) { return percent_of_peak(take->truth->psnr_db(target)); });
@@ -140,10 +149,12 @@ void measure_banding(Bench& bench, const std::string& basis, const Take* take, c
 constexpr const char* limit_note =
     "**What no flow mends.** The scene in full colour under the key light, without noise, mosaic or basis, at the "
     "moments of "
-    "the tracking frames, each moved to the target's and compared with it, where the point can be seen at both; and of "
-    "these pixels only those that are three or more from any other. What the true flow leaves is the change of "
-    "shading, "
-    "highlights and shadows as the subject turns under the lamps, interpolation, and outlines, whose pixels mix what "
+    "the tracking frames half a cycle around the target's, each moved to it, where the point can be seen at both; and "
+    "of "
+    "these pixels only those that are three or more from any other. All but `preview` and `true flow, nearer` are "
+    "blended with "
+    "the moment a cycle away across the target, as `standard` and `final` do. What the true flow leaves is shading "
+    "that does not change evenly (highlights, edges of shadows), interpolation, and outlines, whose pixels mix what "
     "moves "
     "with what does not. A found flow may be nearer than the true one: it follows what pictures show, where shading "
     "stays "
@@ -161,10 +172,15 @@ void measure_limit(Bench& bench, Takes& takes, const MovingScene& scene, const T
                   .note = limit_note,
                   .figures = {{"none", [&] { return percent_of_peak(limit->still_db(where)); }}}};
         for (const std::string quality : {"preview", "standard", "final"})
-            line.figures.push_back(
-                {quality,
-                 [&, quality] { return percent_of_peak(limit->moved_db(*sure(takes.found(*take, quality)), where)); }});
-        line.figures.push_back({"true flow", [&] { return percent_of_peak(limit->moved_db(take->true_path, where)); }});
+            line.figures.push_back({quality, [&, quality] {
+                                        return percent_of_peak(limit->moved_db(*sure(takes.found(*take, quality)),
+                                                                               where,
+                                                                               motion_quality(quality)->interpolates));
+                                    }});
+        for (const bool interpolates : {false, true})
+            line.figures.push_back({interpolates ? "true flow" : "true flow, nearer", [&, interpolates] {
+                                        return percent_of_peak(limit->moved_db(take->true_path, where, interpolates));
+                                    }});
         measure(bench, line);
     }
 }
@@ -175,11 +191,13 @@ void measure_flow(Bench& bench, Takes& takes, const MovingScene& scene, const Ta
         Knots knots;
         double PathError::*value;
     };
-    for (const Figure figure : {Figure{"next, mean", Knots::nearest, &PathError::mean},
-                                Figure{"farthest, mean", Knots::farthest, &PathError::mean},
-                                Figure{"farthest, 95th percentile", Knots::farthest, &PathError::percentile_95}}) {
+    for (const Figure figure :
+         {Figure{"next, mean", Knots::nearest, &PathError::mean},
+          Figure{"half a cycle, mean", Knots::half_a_cycle, &PathError::mean},
+          Figure{"half a cycle, 95th percentile", Knots::half_a_cycle, &PathError::percentile_95}}) {
         const auto error = [take, figure](const MotionPath* found) {
-            return path_error(found, take->true_path, figure.knots, take->truth->subject()).*figure.value;
+            const auto cycle = double(take->recording.sequence.cycle_ticks());
+            return path_error(found, take->true_path, figure.knots, cycle, take->truth->subject()).*figure.value;
         };
         Line line{
             .name = scene.name + ", " + figure.name,
@@ -187,7 +205,7 @@ void measure_flow(Bench& bench, Takes& takes, const MovingScene& scene, const Ta
             .table = "endpoint error of the flow, px",
             .note =
                 "**Flow, and its drift.** From the target to the next tracking frame on either side, 8 ms away, and to "
-                "the farthest, 42 ms and five links of the concatenation away, where the subject is visible at "
+                "half a cycle away, 42 ms and five links of the concatenation, where the subject is visible at "
                 "both. `none` is the motion itself. Five times the error at five times the distance would be "
                 "the same error a frame.",
             .figures = {{"none", [error] { return error(nullptr); }}}};
@@ -205,7 +223,7 @@ class SecondTarget {
 
     void prepare() {
         second_ = {};  // as one that has been written
-        developer_ = developer(take_->recording, quality_);
+        developer_ = developer(take_->recording, quality_, Estimate::none);
         first_ = sure(developer_->develop(take_->recording.targets[0]));
         before_ = developer_->times();
     }
@@ -281,7 +299,7 @@ void measure_time(Bench& bench, const Take* take) {
 SheetBand sheet_band(const std::string& basis, const Take& take, const Targets& targets) {
     SheetBand band{basis, take.truth->relit_truth(1), {}};
     for (const auto& [way, target] : targets)
-        if (way != "preview" && way != "true flow")
+        if (way != nearer_only && way != "preview" && way != "true flow")
             band.pictures.push_back({way, take.truth->relit(target, lightings()[1])});
     return band;
 }
@@ -323,13 +341,15 @@ int main(int argc, char** argv) {
          .truth =
              "The scenes of [motion_scenes.md](motion_scenes.md) through a 12-bit mosaic of 320 x 240 with the "
              "camera's "
-             "noise, each basis at its derived exposure; one target of each. Truth is the scene frozen at the target's "
+             "noise, each basis at its derived exposure, developed with `--estimate clipped`; one target of each. "
+             "Truth is the scene frozen at the target's "
              "moment, without noise. Both are relit as mosaics by a key light of a few lamps, a smooth environment and "
              "a grazing side light; the PSNR is over all pixels that show the subject (truth under all lamps above 2 % "
              "of its 99.9th percentile, misaligned ones included), relative to the 99.9th percentile of the relit "
              "truth, the mean of the three in dB. Settings were tuned on spin, blink, hair and turn180; turn60, talk, "
              "hand and still are for reporting. Times are those of the second target in a row, every fifth tracking "
-             "frame being one, of turn60 at 640 x 480 on one core, without matte frames. The first run renders the "
+             "frame being one, of turn60 at 640 x 480 on one core, without matte frames and estimates. The first run "
+             "renders the "
              "scenes into "
              "out/bench/motion, which takes some twenty minutes; later ones take less than ten.",
          .advice = "Take `standard`; `preview` to look at takes, `final` where time does not matter. Flow gains most "

@@ -18,7 +18,7 @@ namespace ols {
 
 namespace {
 
-constexpr int format_version = 1;  // of the files; 2 when something that makes the frames changes
+constexpr int format_version = 2;  // of the files; another one when something that makes the frames changes
 
 // FNV-1a of what decides the pictures: a changed scene is rendered anew.
 uint64_t hash_of(const std::string& text) {
@@ -59,7 +59,8 @@ Status write_records(const std::string& path, size_t count, size_t bytes, const 
     });
 }
 
-// The slot numbers that the targets need: their basis slots, and the tracking slots from before the first to after the last.
+// The slot numbers that the targets need: a cycle on either side, or where nothing moves and nothing is aligned, the half that is
+// nearest.
 struct Range {
     uint64_t first_target, first, last;
     uint64_t half;  // a cycle
@@ -72,9 +73,8 @@ Range range_of(const RecordingPlan& plan, const Sequence& sequence) {
     uint64_t half = length / 2;
     const uint64_t target = plan.cycle * length + middle;
     while (sequence.slots[(target + half) % length].kind != SlotKind::tracking) ++half;
-    Range range{target, target - middle, target + uint64_t(plan.targets - 1) * half + length - middle, half};
-    while (sequence.slots[range.last % length].kind != SlotKind::tracking) ++range.last;
-    return range;
+    const uint64_t before = plan.is_frozen ? middle : length, after = plan.is_frozen ? length - middle : length;
+    return {target, target - before, target + uint64_t(plan.targets - 1) * half + after, half};
 }
 
 bool is_needed(const Sequence& sequence, uint64_t number) {

@@ -17,8 +17,8 @@ struct RecordingPlan {
     std::string scene;  // a file of the virtual stage
     std::string basis;
     int width = 320, height = 240;
-    // Targets stand at the tracking slot in the middle of this cycle, of every half cycle from there on, and are made of the slots
-    // of half a cycle on either side of them.
+    // Targets stand at the tracking slot in the middle of this cycle, of every half cycle from there on; recorded is a cycle on
+    // either side of them.
     uint32_t cycle = 2;
     int targets = 1;
     bool is_frozen = false;  // at the first target's moment: nothing but noise is left

@@ -57,6 +57,8 @@ struct Layer {
     Vec3 normal = {0, 0, 1};
     std::function<double(int)> shine = {};
     double board = 0;  // r under the matte board's lamps, times albedo
+    double brightening_a_slot =
+        0;  // of the albedo, relative, counted from the first tracking frame of the middle cycle
 };
 
 struct Scene {
@@ -80,7 +82,7 @@ inline std::vector<Image> seen_layers(const Scene& scene, double slots) {
                 const double dx = x - 0.5 * (scene.width - 1) - at.x, dy = y - 0.5 * (scene.height - 1) - at.y;
                 const double cover = std::clamp(layer.radius + 0.5 - std::hypot(dx, dy), 0.0, 1.0);
                 if (cover == 0) continue;
-                own.at(x, y) = float(cover * layer.albedo(dx, dy));
+                own.at(x, y) = float(cover * layer.albedo(dx, dy) * (1 + layer.brightening_a_slot * slots));
                 for (size_t below = 0; below + 1 < seen.size(); ++below) seen[below].at(x, y) *= float(1 - cover);
             }
     }
@@ -110,17 +112,13 @@ class Take {
         return known;
     }
 
-    // With the frames of half a cycle around the target, and tracking and matte frames of a whole one.
+    // With the frames of a cycle on either side of the target.
     TargetFrames around(uint64_t target) {
         FrameStore store(sequence_);
         const FrameRange range = frames_around(sequence_, target);
-        const uint64_t half = sequence_.slots.size() / 2;
-        for (uint64_t number = range.first; number <= range.last; ++number) {
-            const SlotKind kind = sequence_.slots[number % sequence_.slots.size()].kind;
-            const bool is_near = number + half >= target && number <= target + half;
-            const bool is_needed = kind == SlotKind::tracking || kind == SlotKind::matte || is_near;
-            if (!lost_.contains(number) && kind != SlotKind::dark && is_needed) store.add(frame(number));
-        }
+        for (uint64_t number = range.first; number <= range.last; ++number)
+            if (!lost_.contains(number) && sequence_.slots[number % sequence_.slots.size()].kind != SlotKind::dark)
+                store.add(frame(number));
         return store.around(0, target);
     }
 

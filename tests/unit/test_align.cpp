@@ -63,8 +63,9 @@ std::vector<std::vector<Sum>> aligned(const std::shared_ptr<Frame>& frame, const
     AlignedRows<Sample, Sum> rows;
     rows.alignment = std::make_shared<Alignment>(path, width, height, frame->cfa, 0.02f, 1);
     const auto dark = black_planes<Sample>(black, frame->cfa, frame->format);
-    rows.rows = {
-        {{std::make_shared<SignalPlanes<Sample>>(signal_planes(*frame, dark, false)), rows.alignment->place_of(tick)}}};
+    rows.rows.resize(1);
+    rows.rows[0].push_back({.nearer = {std::make_shared<SignalPlanes<Sample>>(signal_planes(*frame, dark, false)),
+                                       rows.alignment->place_of(tick)}});
     std::vector<std::vector<Sum>> out;
     for (int channel = 0; channel < samples_per_pixel(frame->cfa); ++channel) {
         const Band band{0, height, width, channel, samples_per_pixel(frame->cfa)};

@@ -14,7 +14,7 @@ using namespace ols;
 
 namespace {
 
-const NoiseModel noise;
+const NoiseModel noise, quiet = {.read_counts = 0, .shot = 0};
 
 // Bands of one sample.
 template <typename Sum>
@@ -27,10 +27,13 @@ RowBand<Sum> band_of(std::initializer_list<Sum> rows) {
 
 // Three knots, the target's in the middle.
 template <typename Sum>
-Sum followed(Sum before, Sum now, Sum after, Alignment::Place place, Sum sample) {
-    const FollowedBrightness<Sum> brightness(band_of<Sum>({before, now, after}), {1, 1, 1}, 1, noise);
+Sum followed(Sum before, Sum now, Sum after, Alignment::Place place, Sum sample, const NoiseModel& camera = quiet,
+             bool is_moving = true) {
+    const uint8_t moves = is_moving;
+    const std::vector<float> light(3, 1.0f);
+    const FollowedBrightness<Sum> brightness(band_of<Sum>({before, now, after}), light, 1, camera, {&moves, 1});
     RowBand<Sum> samples = band_of<Sum>({sample});
-    brightness.apply(place, samples, 0);
+    brightness.apply(place, samples.row(0));
     return samples.row(0)[0];
 }
 
@@ -45,10 +48,48 @@ TEST(FollowedBrightness, multiplies_by_the_quotient_of_the_target_and_the_slots_
 
 TEST(FollowedBrightness, leaves_to_the_bit_what_changes_less_than_noise_may) {
     const double sigma = noise.read_counts + noise.shot * std::sqrt(1000.0);
-    const auto least = float(6 * std::sqrt(2.0) * sigma);
-    EXPECT_EQ(followed<float>(1000, 1000, 1000 + 0.99f * least, {1, 1.0f}, 123.25f), 123.25f);
-    EXPECT_NE(followed<float>(1000, 1000, 1000 + 1.01f * least, {1, 1.0f}, 123.25f), 123.25f);
-    EXPECT_EQ(followed<float>(2000, 1000, 1000, {1, 0.5f}, 123.25f), 123.25f) << "another interval's change";
+    for (const auto& [is_moving, deviations] : {std::pair(true, 1.5f), std::pair(false, 6.0f)}) {
+        const auto least = float(deviations * std::sqrt(2.0) * sigma);
+        const auto after = [&](float change) {
+            return followed<float>(1000, 1000, 1000 + change * least, {1, 1.0f}, 123.25f, noise, is_moving);
+        };
+        EXPECT_EQ(after(0.99f), 123.25f);
+        EXPECT_NE(after(1.01f), 123.25f);
+    }
+    EXPECT_EQ(followed<float>(2000, 1000, 1000, {1, 0.5f}, 123.25f, noise), 123.25f) << "another interval's change";
+}
+
+// d = 60 of 1000 counts: of the quotient's way from 1 it goes 1 - (n / d)^2.
+TEST(FollowedBrightness, goes_the_farther_the_surer_it_is) {
+    const double n = 1.5 * std::sqrt(2.0) * (noise.read_counts + noise.shot * std::sqrt(1000.0));
+    for (const double difference : {1.1 * n, 2 * n, 10 * n}) {
+        const double quotient = 1000 / (1000 + difference), share = n / difference;
+        const double expected = 300 * (1 + (1 - share * share) * (quotient - 1));
+        EXPECT_NEAR(followed<float>(1000, 1000, float(1000 + difference), {1, 1.0f}, 300, noise), expected, 1e-3);
+    }
+}
+
+// The Wiener filter's aim: over many pixels whose brightness changed, some much, some little, some not, the samples come nearer
+// to the truth than untouched ones and than ones that take every quotient.
+TEST(FollowedBrightness, comes_nearer_to_the_truth_than_nothing_and_than_every_quotient) {
+    std::mt19937 random(9);
+    std::normal_distribution<double> normal;
+    const auto counted = [&](double mean) {
+        return float(mean + (noise.read_counts + noise.shot * std::sqrt(mean)) * normal(random));
+    };
+    double untouched = 0, every = 0, ours = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const double now = 1000, then = now * (1 + (i % 2 ? 0.05 : 0.0) * normal(random));
+        const double truth = now / 4;
+        const auto sample = float(then / 4);
+        const float tracked_now = counted(now), tracked_then = counted(then);
+        const auto squared = [&](double value) { return (value - truth) * (value - truth); };
+        untouched += squared(sample);
+        every += squared(sample * tracked_now / tracked_then);
+        ours += squared(followed<float>(tracked_then, tracked_now, tracked_now, {0, 0.0f}, sample, noise));
+    }
+    EXPECT_LT(ours, 0.95 * untouched);
+    EXPECT_LT(ours, 0.75 * every);
 }
 
 TEST(FollowedBrightness, is_bounded_where_one_of_the_two_is_dark) {
@@ -97,12 +138,15 @@ TEST(FollowedBrightness, gives_the_same_bits_on_every_path_and_leaves_its_neighb
         if (p % 17 == 0) knots.row(p % 4)[p] = masked_sample<int16_t>;
         slot.row(0)[p] = p % 23 == 0 ? masked_sample<int16_t> : int16_t(random() % 4200 - 100);
     }
-    const FollowedBrightness<int16_t> brightness(knots, {1, 1, 1, 1}, 1, noise);
+    const std::vector<float> light(4, 1.0f);
+    std::vector<uint8_t> moves(samples);
+    for (size_t p = 0; p < samples; ++p) moves[p] = p % 3 > 0;
+    const FollowedBrightness<int16_t> brightness(knots, light, 1, noise, moves);
     std::vector<std::vector<int16_t>> results;
     for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
         hwy::SetSupportedTargetsForTest(target);
         RowBand<int16_t> out = slot;
-        brightness.apply({2, 0.3f}, out, 0);
+        brightness.apply({2, 0.3f}, out.row(0));
         results.emplace_back(out.row(0), out.row(0) + samples);
     }
     hwy::SetSupportedTargetsForTest(0);
@@ -113,7 +157,7 @@ TEST(FollowedBrightness, gives_the_same_bits_on_every_path_and_leaves_its_neighb
         for (size_t k = 0; k < 4; ++k) alone.row(k)[0] = knots.row(k)[p];
         RowBand<int16_t> one(1, 1);
         one.row(0)[0] = slot.row(0)[p];
-        FollowedBrightness<int16_t>(alone, {1, 1, 1, 1}, 1, noise).apply({2, 0.3f}, one, 0);
+        FollowedBrightness<int16_t>(alone, light, 1, noise, {&moves[p], 1}).apply({2, 0.3f}, one.row(0));
         EXPECT_EQ(results[0][p], one.row(0)[0]) << p;
     }
 }
@@ -134,13 +178,9 @@ TEST(FollowedBrightness, takes_light_that_all_pixels_have_more_of_for_the_lamps)
     EXPECT_EQ(light[1], 1);
     RowBand<int16_t> slot(1, samples);
     std::fill_n(slot.row(0), samples, int16_t(500));
-    const FollowedBrightness<int16_t> brightness(bands[0], light, 1, noise);
-    brightness.apply({0, 0.0f}, slot, 0);
-    for (size_t p = 0; p < samples; ++p) {
-        const bool is_dark = bands[0].row(1)[p] * 0.5 <
-                             6 * M_SQRT2 * (noise.read_counts + noise.shot * std::sqrt(double(bands[0].row(1)[p])));
-        EXPECT_NEAR(slot.row(0)[p], p % 9 || is_dark ? 500 : 1000, 3) << p;
-    }
+    const FollowedBrightness<int16_t> brightness(bands[0], light, 1, quiet, std::vector<uint8_t>(samples));
+    brightness.apply({0, 0.0f}, slot.row(0));
+    for (size_t p = 0; p < samples; ++p) EXPECT_NEAR(slot.row(0)[p], p % 9 ? 500 : 1000, 3) << p;
 }
 
 TEST(RelativeLight, of_a_dark_frame_is_one) {

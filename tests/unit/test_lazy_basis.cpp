@@ -68,6 +68,12 @@ void expect_as_searched(const Sequence& sequence, uint64_t target, const std::se
         EXPECT_EQ(basis.choices[choice].slot, int(s));
         EXPECT_EQ(int64_t(basis.choices[choice].number), there.front()) << "slot " << s << " of target " << target;
         EXPECT_EQ(basis.choices[choice].is_stand_in, there.front() != nearest);
+        const int64_t other = by_distance(sequence, target, s)[1];
+        const bool has_both = there.front() == nearest && std::ranges::find(there, other) != there.end();
+        ASSERT_EQ(basis.choices[choice].across.has_value(), has_both);
+        if (has_both) {
+            EXPECT_EQ(int64_t(*basis.choices[choice].across), other);
+        }
         ++choice;
     }
     EXPECT_EQ(choice, basis.choices.size());

@@ -38,6 +38,7 @@ class MotionRecording : public testing::Test {
         return {};
     }
 
+    static constexpr double cycle_ticks = 180 * 57870;
     std::filesystem::path folder_;
     RecordingPlan plan_;
 };
@@ -51,10 +52,11 @@ TEST_F(MotionRecording, has_every_slot_that_its_targets_need_and_tracking_frames
     ASSERT_EQ(recording->targets.size(), 2u);
     for (const TargetFrames& frames : recording->targets) {
         EXPECT_TRUE(frames.basis.lost.empty());
-        for (const auto& choice : frames.basis.choices) EXPECT_FALSE(choice.is_stand_in);
-        EXPECT_LE(frames.tracking.front().frame->tick, frames.frames.front()->tick);
-        uint64_t last = 0;
-        for (const auto& frame : frames.frames) last = std::max(last, frame->tick);
+        for (const auto& choice : frames.basis.choices) EXPECT_TRUE(!choice.is_stand_in && choice.across.has_value());
+        uint64_t first = frames.frames.front()->tick, last = first;
+        for (const auto* list : {&frames.frames, &frames.across})
+            for (const auto& frame : *list) first = std::min(first, frame->tick), last = std::max(last, frame->tick);
+        EXPECT_LE(frames.tracking.front().frame->tick, first);
         EXPECT_GE(frames.tracking.back().frame->tick, last);
     }
     EXPECT_NEAR(recording->target_us(1) - recording->target_us(0), 90 * 57870 * 0.008, 1e-6);
@@ -145,13 +147,13 @@ TEST_F(MotionRecording, scores_a_constant_offset_as_its_closed_form_says) {
 TEST_F(MotionRecording, true_path_leads_to_where_the_ball_is_and_is_finite_beside_it) {
     const auto recording = record(plan_, "");
     const MotionPath path = true_path(*recording, 0);
-    ASSERT_EQ(path.size(), 11u);
+    ASSERT_EQ(path.size(), 21u);
     const CameraConfig& camera = recording->camera();
     const double pixels_a_metre =
         camera.height / 2.0 / (1.48 * std::tan(camera.vertical_fov_deg / 2 * 3.14159265358979323846 / 180));
     for (size_t k = 0; k < path.size(); ++k) {
-        EXPECT_EQ(path[k].is_instant, k == 5);
-        const double seconds = (path[k].tick - path[5].tick) / 125e6;
+        EXPECT_EQ(path[k].is_instant, k == 10);
+        const double seconds = (path[k].tick - path[10].tick) / 125e6;
         const size_t middle = size_t(camera.height / 2) * size_t(camera.width) + size_t(camera.width / 2 - 1);
         EXPECT_NEAR(path[k].flow.u[middle], 0.4 * seconds * pixels_a_metre, 0.02);
         for (size_t p = 0; p < path[k].flow.size(); ++p)
@@ -160,21 +162,21 @@ TEST_F(MotionRecording, true_path_leads_to_where_the_ball_is_and_is_finite_besid
     }
 }
 
-TEST_F(MotionRecording, path_error_is_that_of_the_first_and_the_last_knot_where_the_subject_stays_visible) {
+TEST_F(MotionRecording, path_error_is_that_of_half_a_cycle_to_either_side_where_the_subject_stays_visible) {
     const auto recording = record(plan_, "");
     const MotionPath truth = true_path(*recording, 0);
     MotionPath found = truth;
     std::vector<unsigned char> subject(truth[0].flow.size());
     for (size_t p = 0; p < subject.size(); ++p) subject[p] = truth[0].confidence[p] > 0;
     for (size_t p = 0; p < subject.size(); ++p) {
-        for (const size_t k : {size_t(0), truth.size() - 1}) found[k].flow.u[p] += 3, found[k].flow.v[p] += 4;
-        found[3].flow.u[p] += 100;
-        if (!subject[p]) found[0].flow.u[p] += 1000;
+        for (const size_t k : {5, 15}) found[k].flow.u[p] += 3, found[k].flow.v[p] += 4;
+        for (const size_t k : {4, 6, 14, 16}) found[k].flow.u[p] += 100;
+        if (!subject[p]) found[5].flow.u[p] += 1000;
     }
-    const PathError error = path_error(&found, truth, Knots::farthest, subject);
+    const PathError error = path_error(&found, truth, Knots::half_a_cycle, cycle_ticks, subject);
     EXPECT_NEAR(error.mean, 5, 1e-4);
     EXPECT_NEAR(error.percentile_95, 5, 1e-4);
-    EXPECT_EQ(path_error(&found, truth, Knots::nearest, subject).mean, 0);
+    EXPECT_EQ(path_error(&found, truth, Knots::nearest, cycle_ticks, subject).mean, 0);
 }
 
 // Its front moves as far in a cycle as 0.4 m/s leads in five groups of 18 slots on either side; its rim is farther away.
@@ -188,11 +190,11 @@ TEST_F(MotionRecording, motion_of_a_cycle_is_that_of_the_ball_and_without_a_flow
     const auto pixels = [&](double away_m) {
         return cycle_m * camera.height / 2.0 / (away_m * std::tan(camera.vertical_fov_deg / 2 * M_PI / 180));
     };
-    const CycleMotion motion = cycle_motion(truth, ball);
+    const CycleMotion motion = cycle_motion(truth, cycle_ticks, ball);
     EXPECT_NEAR(motion.most_px, pixels(1.48), 0.02);
     EXPECT_LT(motion.mean_px, pixels(1.48));
     EXPECT_GT(motion.mean_px, pixels(1.60));
-    EXPECT_NEAR(path_error(nullptr, truth, Knots::farthest, ball).mean, motion.mean_px / 2, 0.01);
+    EXPECT_NEAR(path_error(nullptr, truth, Knots::half_a_cycle, cycle_ticks, ball).mean, motion.mean_px / 2, 0.01);
     EXPECT_EQ(moving_pixels(truth, ball), ball) << "all of it moves by more than a quarter of a pixel";
     MotionPath still = truth;
     for (MotionKnot& knot : still) {
@@ -226,7 +228,8 @@ TEST_F(MotionRecording, limit_without_a_flow_is_the_error_of_the_frames_as_they_
     for (MotionKnot& knot : path) knot.flow = FlowField(knot.flow.width, knot.flow.height);
     const AlignLimit limit(*recording, path);
     EXPECT_GT(limit.still_db(AlignLimit::Where::visible), 0);
-    EXPECT_NEAR(limit.moved_db(path, AlignLimit::Where::visible), limit.still_db(AlignLimit::Where::visible), 1e-3);
+    EXPECT_NEAR(limit.moved_db(path, AlignLimit::Where::visible, false), limit.still_db(AlignLimit::Where::visible),
+                1e-3);
 }
 
 // Its rim stays: antialiased, it is interpolated.
@@ -239,9 +242,13 @@ TEST_F(MotionRecording, limit_of_a_ball_that_moves_sideways_is_above_no_alignmen
     const auto recording = record(plan_, "");
     const MotionPath path = true_path(*recording, 0);
     const AlignLimit limit(*recording, path);
-    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::visible), limit.still_db(AlignLimit::Where::visible) + 3);
-    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::inside), limit.moved_db(path, AlignLimit::Where::visible) + 3)
+    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::visible, false), limit.still_db(AlignLimit::Where::visible) + 3);
+    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::inside, false),
+              limit.moved_db(path, AlignLimit::Where::visible, false) + 3)
         << "the rim is left out";
+    EXPECT_GT(limit.moved_db(path, AlignLimit::Where::inside, true),
+              limit.moved_db(path, AlignLimit::Where::inside, false) + 3)
+        << "its light changes nearly evenly";
 }
 
 TEST_F(MotionRecording, of_a_scene_that_is_not_there_is_an_error_that_names_it) {

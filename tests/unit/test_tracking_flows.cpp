@@ -96,6 +96,18 @@ TEST(TrackingFlows, reach_from_the_last_frame_before_to_the_first_after_as_far_a
     EXPECT_EQ(frames_of(*flows.path(5000, 4500, 99000)), (std::vector<double>{4, 5}));
 }
 
+TEST(TrackingFlows, refine_what_is_near_and_concatenate_from_there) {
+    TrackingFlows flows = flows_of({0, 1, 2, 3, 4, 5, 6}), coarse = flows_of({0, 1, 2, 3, 4, 5, 6}, options(false));
+    const MotionPath all = *flows.path(3000, 0, 6000), some = *flows.path(3000, {0, 6000}, {1500, 4500}),
+                     none = *coarse.path(3000, 0, 6000);
+    for (const size_t k : {1, 2, 4, 5}) EXPECT_EQ(some[k].flow.u, all[k].flow.u) << k;
+    for (const size_t k : {0, 6}) {
+        EXPECT_NE(some[k].flow.u, all[k].flow.u);
+        EXPECT_NE(some[k].flow.u, none[k].flow.u);
+        expect_true(some[k], 3000, 0.15);
+    }
+}
+
 TEST(TrackingFlows, leave_an_instant_outside_all_frames_alone) {
     TrackingFlows flows = flows_of({1, 2, 3});
     for (const double instant : {0.0, 3001.0}) {
