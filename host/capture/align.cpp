@@ -58,18 +58,8 @@ Alignment::Alignment(const MotionPath& path, int width, int height, Cfa cfa, flo
                            enlarged(worse, first.flow, width, height)};
     });
     for (auto& interval : made) intervals_.push_back(std::move(*interval));
-    find_moves(width, height);
-}
-
-void Alignment::find_moves(int width, int height) {
     moves_.resize(size_t(width) * size_t(height));
-    for (const Interval& interval : intervals_)
-        for (int y = 0; y < height; ++y)
-            for (int run = 0; run < interval.motion.runs(); ++run) {
-                if (interval.motion.is_still(run, y)) continue;
-                const int first = run * GroupMotion::run_samples;
-                std::fill_n(moves_.begin() + y * width + first, std::min(GroupMotion::run_samples, width - first), 1);
-            }
+    for (const Interval& interval : intervals_) interval.motion.mark_moving(moves_);
 }
 
 Alignment::Place Alignment::place_of(double tick) const {

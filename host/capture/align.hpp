@@ -53,8 +53,6 @@ class Alignment {
         GroupMotion motion;
         std::vector<float> confidence;
     };
-    void find_moves(int width, int height);
-
     std::vector<Interval> intervals_;
     std::vector<uint8_t> moves_;
 };

@@ -30,9 +30,9 @@ std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t in
 //
 // Of the difference d = T0 - T, noise is likely to be a part: at a tracking frame's time samples are multiplied by
 // 1 + g (T0 / T - 1) with g = 1 - (n / d)^2, and not at all where |d| <= n; n is 1.5 standard deviations of the camera's noise in d,
-// 6 where nothing moves, so that there hardly a sample is touched for nothing. With one standard deviation that is the Wiener filter's
-// gain. In between the factor's inverse is linear in time, as T is. Samples stay to the bit where it is 1, and it is 1 where T or T0 is not known. T0 / T
-// stays within 1/4 and 4, as the sample's noise is multiplied with it.
+// 6 where nothing moves, so that there hardly a sample is touched for nothing. With one standard deviation that is the Wiener
+// filter's gain. In between the factor's inverse is linear in time, as T is. Samples stay to the bit where it is 1, and it is 1
+// where T or T0 is not known. T0 / T stays within 1/4 and 4, as the sample's noise is multiplied with it.
 template <typename Sum>
 class FollowedBrightness {
   public:

@@ -34,8 +34,8 @@ struct LazyBasis {
         uint64_t number = 0;
         int slot = 0;              // of the cycle
         bool is_stand_in = false;  // for a lost one
-        std::optional<uint64_t>
-            across;  // number of the slot's frame on the target's other side, if recorded; none of a stand-in
+        // The number of the slot's frame on the target's other side, if recorded; none of a stand-in.
+        std::optional<uint64_t> across = {};
     };
     uint64_t target = 0;
     std::vector<Choice> choices;  // in slot order

@@ -63,18 +63,13 @@ std::vector<float> trust_across(const Alignment& alignment, size_t nearer_interv
     constexpr size_t slack = 16;
     const std::vector<float>&here = alignment.confidence(nearer_interval),
           &there = alignment.confidence(across_interval);
-    const GroupMotion &motion = alignment.motion(nearer_interval), &other = alignment.motion(across_interval);
+    std::vector<uint8_t> moves(here.size());
+    for (const size_t interval : {nearer_interval, across_interval}) alignment.motion(interval).mark_moving(moves);
     std::vector<float> trust(here.size() + slack);
-    const auto [width, height, step] = motion.grid();
-    for (int y = 0; y < height; ++y)
-        for (int run = 0; run < motion.runs(); ++run) {
-            if (motion.is_still(run, y) && other.is_still(run, y)) continue;
-            const int first = run * GroupMotion::run_samples, end = std::min(first + GroupMotion::run_samples, width);
-            for (size_t p = size_t(y * width + first); p < size_t(y * width + end); ++p) {
-                const float quotient = std::max(there[p], least) / std::max(here[p], least);
-                trust[p] = std::min(1.0f, quotient * quotient);
-            }
-        }
+    for (size_t p = 0; p < moves.size(); ++p) {
+        const float quotient = std::max(there[p], least) / std::max(here[p], least);
+        if (moves[p]) trust[p] = std::min(1.0f, quotient * quotient);
+    }
     return trust;
 }
 

@@ -209,6 +209,25 @@ void GroupMotion::keep_own(const float* const (&rows)[4], int y, const std::vect
     }
 }
 
+bool GroupMotion::is_still(size_t run) const {
+    float sum = 0;  // NaN where it is no line
+    for (const auto* part : {&lines_.base_u, &lines_.base_du, &lines_.base_v, &lines_.base_dv, &lines_.step_u,
+                             &lines_.step_du, &lines_.step_v, &lines_.step_dv})
+        sum += std::abs((*part)[run]);
+    return sum == 0;
+}
+
+void GroupMotion::mark_moving(std::span<uint8_t> marks) const {
+    assert(marks.size() == size_t(grid_.width) * size_t(grid_.height));
+    for (int y = 0; y < grid_.height; ++y)
+        for (int run = 0; run < runs_; ++run) {
+            if (is_still(size_t(y) * size_t(runs_) + size_t(run))) continue;
+            const int first = run * run_samples;
+            std::fill_n(&marks[size_t(y) * size_t(grid_.width) + size_t(first)],
+                        std::min(run_samples, grid_.width - first), uint8_t(1));
+        }
+}
+
 double GroupMotion::linear_share() const {
     return own_index_.empty() ? 0 : 1 - double(own_.size()) / double(own_index_.size());
 }

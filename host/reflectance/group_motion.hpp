@@ -3,9 +3,9 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "reflectance/flow_field.hpp"
@@ -64,21 +64,16 @@ class GroupMotion {
         return index < 0 ? nullptr : &own_[size_t(index)];
     }
 
-    // Whether a run lies on a line along which nothing moves, at any fraction of the step.
-    bool is_still(int run, int y) const {
-        const size_t at = size_t(y) * size_t(runs_) + size_t(run);
-        float sum = 0;  // NaN where it is no line
-        for (const auto* part : {&lines_.base_u, &lines_.base_du, &lines_.base_v, &lines_.base_dv, &lines_.step_u,
-                                 &lines_.step_du, &lines_.step_v, &lines_.step_dv})
-            sum += std::abs((*part)[at]);
-        return sum == 0;
-    }
+    // Sets marks[y * grid().width + x] to 1 for the samples of every run that does not lie on a line along which nothing moves, at any
+    // fraction of the step; the others stay.
+    void mark_moving(std::span<uint8_t> marks) const;
 
     // The vectors of row y at a fraction of the step: grid().width values each.
     void vectors(int y, float fraction, float* u_out, float* v_out) const;
 
   private:
     void make(const FlowField& base, const FlowField& step, float tolerance_steps);
+    bool is_still(size_t run) const;  // counted over all rows
     void keep_own(const float* const (&rows)[4], int y, const std::vector<uint8_t>& is_line);
 
     SampleGrid grid_;

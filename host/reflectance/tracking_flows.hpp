@@ -58,10 +58,9 @@ class TrackingFlows {
         double from, to;
     };
     // From the instant to the tracking frames from the last at or before reach.from to the first at or after reach.to, as far
-    // as there are any; those that are needed for times within `refined` are refined, what lies farther stands as it is concatenated.
-    // The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to
-    // move evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with
-    // itself. Flows between neighbours are kept for the next instant.
+    // as there are any; those that are needed for times within `refined` are refined, what lies farther stands as it is
+    // concatenated. The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to move
+    // evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with itself. Flows between neighbours are kept for the next instant.
     Result<MotionPath> path(double instant, const Reach& reach, const Reach& refined);
     Result<MotionPath> path(double instant, double from, double to) { return path(instant, {from, to}, {from, to}); }
 
@@ -75,8 +74,8 @@ class TrackingFlows {
 
     Status find_local_flows(size_t first, size_t last);
     struct Walk {
-        const Frame*
-            reference;  // the instant's own frame, which long-range flows are refined against; null where there is none
+        // The instant's own frame, which long-range flows are refined against; null where there is none.
+        const Frame* reference;
         Reach refined;
         int direction;
         size_t at, end;

@@ -352,11 +352,14 @@ int main(int argc, char** argv) {
              "renders the "
              "scenes into "
              "out/bench/motion, which takes some twenty minutes; later ones take less than ten.",
-         .advice = "Take `standard`; `preview` to look at takes, `final` where time does not matter. Flow gains most "
-                   "where things "
-                   "pass before each other and where the picture turns. Where even the true flow gains little, the "
-                   "subject is lit "
-                   "anew as it turns under the lamps, and no flow can undo that."});
+         .advice =
+             "Take `standard`; `preview` to look at takes, `final` where time does not matter. Flow gains most "
+             "where things "
+             "pass before each other, where the picture turns and where texture is fine. Where even the true flow "
+             "gains "
+             "little, the "
+             "subject is lit anew as it turns under the lamps: what changes evenly is blended from both sides, edges "
+             "of shadows and highlights are not."});
     Takes takes(bench.full() ? "out/bench/motion" : "");
     const auto is_turn60 = [](const MovingScene& scene) { return scene.name == "turn60"; };
     measure_time(bench, bench.measures()

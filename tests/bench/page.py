@@ -43,12 +43,17 @@ def rows_of(knob, rows):
 PSNR_UNIT = "% of peak rms"
 
 
+def psnr_db(percent_of_peak):
+    """NaN of an exact result and of one that is not finite."""
+    return -20 * math.log10(percent_of_peak / 100) if percent_of_peak else math.nan
+
+
 def figure_text(row):
     """A figure for a table of many knobs: without its unit, an rms error in percent of a peak as PSNR."""
     if row["error"] is None:
         return "not finite"
     if row["error_unit"] == PSNR_UNIT:
-        return f"{-20 * math.log10(row['error'] / 100):.1f}" if row["error"] > 0 else "exact"
+        return f"{psnr_db(row['error']):.1f}" if row["error"] > 0 else "exact"
     return significant(row["error"], 3)
 
 

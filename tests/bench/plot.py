@@ -61,13 +61,16 @@ def draw_panel(axes, title, rows):
 
 
 def draw_table_panel(axes, title, knobs, rows):
-    """Figures of many knobs with the same settings: a place a knob, a mark a setting."""
+    """Figures of many knobs with the same settings: a place a knob, a mark a setting; none where the result is exact."""
+    unit = page.rows_of(knobs[0], rows)[0]["error_unit"]
+    is_psnr = unit == page.PSNR_UNIT
     for number, setting in enumerate(knobs[0]["settings"]):
-        heights = [next(row["error"] for row in page.rows_of(knob, rows) if row["setting"] == setting) for knob in knobs]
-        axes.plot(range(len(knobs)), heights, "osv^D"[number % 5], markersize=5, label=setting, linestyle="none")
+        errors = [next(row["error"] for row in page.rows_of(knob, rows) if row["setting"] == setting) for knob in knobs]
+        heights = [page.psnr_db(error) for error in errors] if is_psnr else errors
+        axes.plot(range(len(knobs)), heights, "osv^D<>P"[number % 8], markersize=5, label=setting, linestyle="none")
     axes.set_title(title, fontsize=10, loc="left")
-    axes.set_yscale("log")
-    axes.set_ylabel(f"figure, {page.rows_of(knobs[0], rows)[0]['error_unit']}", fontsize=8)
+    axes.set_yscale("linear" if is_psnr else "log")
+    axes.set_ylabel("PSNR, dB" if is_psnr else f"figure, {unit}", fontsize=8)
     axes.set_xticks(range(len(knobs)), [knob["knob"] for knob in knobs], rotation=90, fontsize=6)
     axes.tick_params(axis="y", labelsize=8)
     axes.grid(alpha=0.25)
