@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A plan of additions where the basis has a known structure (hadamard_plan.hpp); a factor where each row is an image of
-// its own (single lamps); for any other a matrix product by OpenBLAS, in blocks of samples that stay in the second-level
-// cache (159 rows x 256 samples x 4 bytes = 163 KB). Integer weights are exact in all: sums of whole numbers below 2^24
-// are exact in float, whatever their order, and below 2^53 in double.
+// A plan of additions where the basis has a known structure (hadamard_plan.hpp); a factor where each row is an image of its own
+// (single lamps, scaled_row.hpp); for any other a matrix product by OpenBLAS, in blocks of samples that stay in the second-level cache
+// (159 rows x 256 samples x 4 bytes = 163 KB). Integer weights are exact in all: sums of whole numbers below 2^24 are exact in
+// float, whatever their order, and below 2^53 in double.
 #include "reflectance/demultiplex.hpp"
 
 #include <cblas.h>
@@ -20,6 +20,7 @@
 
 #include "reflectance/fill_model.hpp"
 #include "reflectance/hadamard_tile.hpp"
+#include "reflectance/scaled_row.hpp"
 
 namespace ols {
 
@@ -30,12 +31,11 @@ constexpr size_t block_samples = 8 * tile_samples;
 // Runs `threads` workers, each calling its own work(begin, count) for blocks it takes from a shared counter. Blocks are
 // independent, so who takes which does not matter.
 template <typename MakeWorker>
-void for_each_block(size_t samples, int threads, const MakeWorker& make_worker) {
+void for_each_block(size_t samples, size_t block, int threads, const MakeWorker& make_worker) {
     std::atomic<size_t> next{0};
     const auto run = [&] {
         auto work = make_worker();
-        for (size_t begin; (begin = next.fetch_add(block_samples)) < samples;)
-            work(begin, std::min(block_samples, samples - begin));
+        for (size_t begin; (begin = next.fetch_add(block)) < samples;) work(begin, std::min(block, samples - begin));
     };
     if (threads <= 0) threads = std::max(1, int(std::thread::hardware_concurrency()));
     std::vector<std::jthread> others;
@@ -81,7 +81,7 @@ void demultiplex_by_plan(const LaidOutPlan& made, const Basis& basis, std::span<
         job.rows16 = {rows};
     else
         job.rows32 = {rows};
-    for_each_block(samples, options.threads, [&] {
+    for_each_block(samples, block_samples, options.threads, [&] {
         return [&, scratch = std::make_unique<TileScratch>(made.plan)](size_t begin, size_t count) {
             TileCounts counts;
             invert_tiles(job, begin, begin + count, *scratch, counts);
@@ -201,19 +201,11 @@ class MatrixWorker {
   public:
     MatrixWorker(const Basis& basis, const InverseMatrix& matrix, std::span<float* const> lamps,
                  std::span<const float> factors, std::span<const float* const> offsets)
-        : basis_(basis),
-          matrix_(matrix),
-          lamps_(lamps),
-          factors_(factors),
-          offsets_(offsets),
-          one_row_each_(is_one_image_a_row(basis)) {}
+        : basis_(basis), matrix_(matrix), lamps_(lamps), factors_(factors), offsets_(offsets) {}
 
     template <typename Sample>
     void invert(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
-        if (one_row_each_)
-            scale(rows, begin, count);
-        else
-            multiply(rows, begin, count);
+        multiply(rows, begin, count);
         for (size_t i = 0; i < offsets_.size(); ++i)
             for (size_t p = begin; p < begin + count; ++p) lamps_[i][p] -= offsets_[i][p];
     }
@@ -236,14 +228,6 @@ class MatrixWorker {
         store(block.images, begin, count);
     }
 
-    template <typename Sample>
-    void scale(const std::vector<const Sample*>& rows, size_t begin, size_t count) {
-        for (size_t i = 0; i < lamps_.size(); ++i)
-            for (size_t p = 0; p < count; ++p)
-                lamps_[i][begin + p] =
-                    float(matrix_.doubles[i * rows.size() + i] * double(rows[i][p])) * factors_[begin + p];
-    }
-
     template <typename Real>
     void store(const std::vector<Real>& images, size_t begin, size_t count) {
         for (size_t i = 0; i < lamps_.size(); ++i)
@@ -256,32 +240,65 @@ class MatrixWorker {
     std::span<float* const> lamps_;
     std::span<const float> factors_;
     std::span<const float* const> offsets_;
-    bool one_row_each_;
     Block<float> small_;
     Block<double> large_;
 };
+
+// From a block's first sample on; null where a row is.
+template <typename Sample>
+std::vector<const Sample*> rows_at(std::span<const Sample* const> rows, size_t begin) {
+    std::vector<const Sample*> from;
+    for (const Sample* row : rows) from.push_back(row ? row + begin : nullptr);
+    return from;
+}
 
 template <typename Sample>
 void demultiplex_by_matrix(const InverseMatrix& matrix, const Basis& basis, std::span<const Sample* const> rows,
                            size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
     const auto factors = sample_factors(basis, samples, options);
-    const auto at = [&](size_t begin) {
-        std::vector<const Sample*> from;
-        for (const Sample* row : rows) from.push_back(row ? row + begin : nullptr);
-        return from;
-    };
-    for_each_block(samples, options.threads, [&] {
+    for_each_block(samples, block_samples, options.threads, [&] {
         MatrixWorker worker(basis, matrix, lamps, factors, options.offsets);
         if constexpr (std::is_same_v<Sample, float>)
             return [&, worker = std::move(worker)](size_t begin, size_t count) mutable {
-                worker.invert(at(begin), begin, count);
+                worker.invert(rows_at(rows, begin), begin, count);
             };
         else
             return [&, worker = std::move(worker), counts = CountBlock<Sample>(basis, options.filler)](
                        size_t begin, size_t count) mutable {
-                worker.invert(counts.load(at(begin), begin, count), begin, count);
+                worker.invert(counts.load(rows_at(rows, begin), begin, count), begin, count);
             };
     });
+}
+
+// By image the weight of its row, where each row is an image of its own; else empty.
+std::vector<double> own_weights(const Basis& basis) {
+    if (!is_one_image_a_row(basis)) return {};
+    std::vector<double> weights;
+    for (int i = 0; i < basis.images(); ++i)
+        weights.push_back(basis.has_integers() ? basis.weight(i, i) : basis.inverse(i, i));
+    return weights;
+}
+
+template <typename Sample>
+void demultiplex_by_scale(const std::vector<double>& weights, const Basis& basis, std::span<const Sample* const> rows,
+                          size_t samples, std::span<float* const> lamps, const DemultiplexOptions& options) {
+    const auto factors = sample_factors(basis, samples, options);
+    const auto scale = [&](const auto& from, size_t begin, size_t count) {
+        for (size_t i = 0; i < lamps.size(); ++i) {
+            const float* const offsets = options.offsets.empty() ? nullptr : options.offsets[i] + begin;
+            scale_row(from[i], count, {weights[i], &factors[begin], offsets}, lamps[i] + begin);
+        }
+    };
+    if constexpr (!std::is_same_v<Sample, float>)
+        if (options.filler)
+            return for_each_block(samples, block_samples, options.threads, [&] {
+                return [&, counts = CountBlock<Sample>(basis, options.filler)](size_t begin, size_t count) mutable {
+                    scale(counts.load(rows_at(rows, begin), begin, count), begin, count);
+                };
+            });
+    constexpr size_t long_block = 16 * block_samples;  // so that memory is read and written in long runs
+    for_each_block(samples, long_block, options.threads,
+                   [&] { return [&](size_t begin, size_t count) { scale(rows_at(rows, begin), begin, count); }; });
 }
 
 }  // namespace
@@ -289,6 +306,7 @@ void demultiplex_by_matrix(const InverseMatrix& matrix, const Basis& basis, std:
 struct Demultiplexer::Ready {
     const Basis& basis;
     std::shared_ptr<const LaidOutPlan> plan;
+    std::vector<double> weights;  // own_weights()
     std::once_flag matrix_made;
     std::optional<InverseMatrix> matrix;
 
@@ -299,6 +317,7 @@ struct Demultiplexer::Ready {
         assert(options.gain.empty() || options.gain.size() == samples);
         if constexpr (!std::is_same_v<Sample, float>)
             if (plan) return demultiplex_by_plan(*plan, basis, rows, samples, lamps, options);
+        if (!weights.empty()) return demultiplex_by_scale(weights, basis, rows, samples, lamps, options);
         std::call_once(matrix_made, [&] {
             openblas_set_num_threads(1);  // blocks are what runs in parallel
             matrix.emplace(basis);
@@ -307,7 +326,8 @@ struct Demultiplexer::Ready {
     }
 };
 
-Demultiplexer::Demultiplexer(const Basis& basis) : ready_(new Ready{basis, plan_for(basis), {}, {}}) {}
+Demultiplexer::Demultiplexer(const Basis& basis)
+    : ready_(new Ready{basis, plan_for(basis), own_weights(basis), {}, {}}) {}
 
 Demultiplexer::~Demultiplexer() = default;
 

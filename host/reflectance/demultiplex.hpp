@@ -37,8 +37,8 @@ class Demultiplexer {
     void invert(std::span<const int32_t* const> rows, size_t samples, std::span<float* const> lamps,
                 const DemultiplexOptions& options = {}) const;
     // The same bits from 16-bit rows, as a camera or the warp makes them: by a plan in less time, for nothing is narrowed.
-    // Either way lamps that begin at a multiple of 64 bytes are written past the caches, which takes a quarter of the time
-    // of others.
+    // Either way lamps that begin at a multiple of 64 bytes are written past the caches, which takes a quarter of the time of
+    // others; so are those of a basis whose rows are images of their own.
     void invert(std::span<const int16_t* const> rows, size_t samples, std::span<float* const> lamps,
                 const DemultiplexOptions& options = {}) const;
     // The same for sources that do not quantise: sums in double. Here and without integer weights the order of a sum is the
