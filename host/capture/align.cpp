@@ -66,7 +66,7 @@ Alignment::Place Alignment::place_of(double tick) const {
     size_t i = 0;
     while (i + 1 < intervals_.size() && intervals_[i].last_tick <= tick) ++i;
     const Interval& interval = intervals_[i];
-    return {i, float((tick - interval.first_tick) / (interval.last_tick - interval.first_tick))};
+    return {i, float((tick - interval.first_tick) / (interval.last_tick - interval.first_tick)), tick};
 }
 
 }  // namespace ols

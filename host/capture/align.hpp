@@ -37,6 +37,7 @@ class Alignment {
     struct Place {
         size_t interval = 0;
         float fraction = 0;  // of the interval that has passed; below 0 or above 1 beyond
+        double tick = 0;
     };
     Place place_of(double tick) const;
 

@@ -23,13 +23,14 @@ using SampleChannels = SignalPlanes<float>::Channels;
 
 // False where it is known that no sample is masked.
 bool warp(const CountChannels& channels, int largest, const GroupMotion& motion, float fraction, const Band& band,
-          int16_t* out) {
+          int16_t* out, const CountChannels* next) {
     const auto& plane = channels[size_t(band.channel)];
-    return warp_counts({plane.row(0), plane.grid(), plane.pitch(), largest, true, plane.margin}, motion, fraction,
-                       range_of(band), out, band.width);
+    const int16_t* const next_counts = next ? (*next)[size_t(band.channel)].row(0) : nullptr;
+    return warp_counts({plane.row(0), plane.grid(), plane.pitch(), largest, true, plane.margin, next_counts}, motion,
+                       fraction, range_of(band), out, band.width);
 }
-bool warp(const SampleChannels& channels, int, const GroupMotion& motion, float fraction, const Band& band,
-          float* out) {
+bool warp(const SampleChannels& channels, int, const GroupMotion& motion, float fraction, const Band& band, float* out,
+          const SampleChannels*) {
     const auto& plane = channels[size_t(band.channel)];
     warp_samples({plane.row(0), plane.grid(), plane.pitch(), true}, motion, fraction, range_of(band), out, band.width);
     return true;
@@ -42,9 +43,9 @@ Sum rounded(Sample sample) {
 }
 
 bool warp(const SampleChannels& channels, int largest, const GroupMotion& motion, float fraction, const Band& band,
-          int32_t* out) {
+          int32_t* out, const SampleChannels* next) {
     std::vector<float, PlaneAllocator<float>> warped(band.samples());
-    warp(channels, largest, motion, fraction, band, warped.data());
+    warp(channels, largest, motion, fraction, band, warped.data(), next);
     std::ranges::transform(warped, out, rounded<int32_t, float>);
     return true;
 }
@@ -84,34 +85,43 @@ size_t AlignedRows<Sample, Sum>::blended_sources() const {
 
 // False where it is known that no sample is masked.
 template <typename Sample, typename Sum>
-bool AlignedRows<Sample, Sum>::load_recorded(const Recorded& recorded, const Loading& loading, Sum* out) const {
+bool AlignedRows<Sample, Sum>::load_recorded(const Recorded& recorded, const Recorded* next, const Loading& loading,
+                                             Sum* out) const {
     const auto& [planes, place] = recorded;
-    const bool may_lack =
-        warp(planes->channels, planes->largest, alignment->motion(place.interval), place.fraction, loading.band, out);
-    if (loading.brightness) loading.brightness->apply(place, out);
+    const bool may_lack = warp(planes->channels, planes->largest, alignment->motion(place.interval), place.fraction,
+                               loading.band, out, next ? &next->planes->channels : nullptr);
+    if (loading.brightness) loading.brightness->apply(place.tick, out);
     return planes->any_masked && may_lack;
 }
 
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::load_nearer(const Source& source, Loading& loading, std::span<Sum> out) const {
-    if (!load_recorded(source.nearer, loading, out.data())) return;
+void AlignedRows<Sample, Sum>::load_nearer(const Recorded& recorded, const Recorded* next, Loading& loading,
+                                           std::span<Sum> out) const {
+    if (!load_recorded(recorded, next, loading, out.data())) return;
     std::vector<uint8_t>& masked = loading.loaded.masked;
     for (size_t p = 0; p < out.size(); ++p) masked[p] |= uint8_t(is_masked(out[p]) ? int(mask_saturated) : 0);
     if (!loading.clipped_stay) return;
-    const auto& [planes, place] = source.nearer;
+    const auto& [planes, place] = recorded;
     warp(planes->clipped, planes->largest, alignment->motion(place.interval), place.fraction, loading.band,
-         loading.beside.data());
+         loading.beside.data(), nullptr);
     for (size_t p = 0; p < out.size(); ++p)
         if (is_masked(out[p])) out[p] = loading.beside[p];
 }
 
 // `part`: of the row that the source is.
 template <typename Sample, typename Sum>
-void AlignedRows<Sample, Sum>::blend(const Across& across, float part, Loading& loading, std::span<Sum> out) const {
+void AlignedRows<Sample, Sum>::blend(const Across& across, const Recorded* next, float part, Loading& loading,
+                                     std::span<Sum> out) const {
     const float* const trust = across.trust->data() + loading.band.first_pixel();
     if (std::all_of(trust, trust + out.size(), [](float value) { return value == 0; })) return;
-    load_recorded(across.recorded, loading, loading.beside.data());
+    load_recorded(across.recorded, next, loading, loading.beside.data());
     blend_across<Sum>({out, loading.beside.data(), trust, across.share, loading.loaded.noise.data(), part});
+}
+
+template <typename Sample, typename Sum>
+auto AlignedRows<Sample, Sum>::loaded_after(size_t row, size_t source) const -> const Recorded* {
+    if (source + 1 < rows[row].size()) return &rows[row][source + 1].nearer;
+    return row + 1 < rows.size() && !rows[row + 1].empty() ? &rows[row + 1].front().nearer : nullptr;
 }
 
 template <typename Sample, typename Sum>
@@ -124,15 +134,17 @@ void AlignedRows<Sample, Sum>::load_row(size_t row, Loading& loading) const {
         std::ranges::fill(out, masked_sample<Sum>);
         for (uint8_t& mark : masked) mark |= mask_missing;
     }
-    for (const Source& source : sources) {
-        load_nearer(source, loading, out);
+    for (size_t s = 0; s < sources.size(); ++s) {
+        const Source& source = sources[s];
+        const Recorded* const next = loaded_after(row, s);
+        load_nearer(source.nearer, source.across ? &source.across->recorded : next, loading, out);
         if (masks_untrusted) {
             const float* trust =
                 alignment->confidence(source.nearer.place.interval).data() + loading.band.first_pixel();
             for (size_t p = 0; p < out.size(); ++p)
                 if (trust[p] < trusted_confidence) out[p] = masked_sample<Sum>, masked[p] |= mask_misaligned;
         }
-        if (source.across) blend(*source.across, 1 / float(sources.size()), loading, out);
+        if (source.across) blend(*source.across, next, 1 / float(sources.size()), loading, out);
         for (size_t p = 0; p < sums.size(); ++p)
             if (!is_masked(out[p])) sums[p] += float(out[p]), ++counts[p];
     }
@@ -147,7 +159,7 @@ RowBand<Sum> AlignedRows<Sample, Sum>::load(const Band& band, const Frame& like,
     set_black(loaded, band, like, black);
     std::optional<FollowedBrightness<Sum>> brightness;
     if (tracking)
-        brightness.emplace(tracking->load(band, like, black, false), tracking_light, instant, noise,
+        brightness.emplace(tracking->load(band, like, black, false), knots, noise,
                            std::span(alignment->moves()).subspan(band.first_pixel(), band.samples()));
     constexpr size_t lanes = 16;
     const size_t padded = (band.samples() + lanes - 1) / lanes * lanes;

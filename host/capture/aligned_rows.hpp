@@ -39,11 +39,10 @@ struct AlignedRows {
     // Whether samples of pixels that are not trusted are masked, for an estimate with a prior to fill in. Otherwise they stay as they
     // are: rows that lost a whole group of slots determine no lamp.
     bool masks_untrusted = false;
-    // The tracking frames, a row for each knot of the alignment, whose brightness samples follow; null: they do not.
+    // The tracking frames, a row each, whose brightness samples follow; null: they do not.
     std::shared_ptr<const AlignedRows> tracking;
-    std::vector<float> tracking_light;  // relative_light() of these
-    size_t instant = 0;                 // the target's knot
-    NoiseModel noise;                   // of the camera
+    BrightnessKnots knots;  // these
+    NoiseModel noise;       // of the camera
 
     // The mean of each row's frames. `like`: a frame of the take. With `clipped_stay` saturated samples count like others,
     // marked all the same.
@@ -65,9 +64,12 @@ struct AlignedRows {
         RowBand<Sum>& loaded;
         std::vector<Sum, PlaneAllocator<Sum>> beside;  // as long as a row
     };
-    bool load_recorded(const Recorded& recorded, const Loading& loading, Sum* out) const;
-    void load_nearer(const Source& source, Loading& loading, std::span<Sum> out) const;
-    void blend(const Across& across, float part, Loading& loading, std::span<Sum> out) const;
+    // The nearer frame whose turn is after that of a row's source; null where there is none.
+    const Recorded* loaded_after(size_t row, size_t source) const;
+    // `next`: what is loaded after it; may be null.
+    bool load_recorded(const Recorded& recorded, const Recorded* next, const Loading& loading, Sum* out) const;
+    void load_nearer(const Recorded& recorded, const Recorded* next, Loading& loading, std::span<Sum> out) const;
+    void blend(const Across& across, const Recorded* next, float part, Loading& loading, std::span<Sum> out) const;
     void load_row(size_t row, Loading& loading) const;
 };
 

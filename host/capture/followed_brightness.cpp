@@ -3,6 +3,7 @@
 #include "capture/followed_brightness.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <type_traits>
@@ -32,6 +33,11 @@ struct Compared {
     const float* noise;  // the difference that noise may make; infinite where `now` is not known
 };
 
+// Of a camera, and how many of its deviations a difference may be.
+struct AllowedNoise {
+    float read, shot, moving, still;
+};
+
 // One interval, for a slot at a fraction of it.
 struct Following {
     const std::vector<uint32_t>& blocks;
@@ -47,9 +53,27 @@ namespace ols {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// divisors = 1 / (1 + g (T0 / T - 1))
+// The difference that noise may make; infinite where `now` is not known.
 template <typename Sum>
-void compare_in(const Compared<Sum>& knot, size_t count, float* divisors) {
+void allow_in(const Sum* now, const uint8_t* moves, size_t count, const AllowedNoise& allowed, float* noise) {
+    const Floats d;
+    const hn::Rebind<uint8_t, Floats> d8;
+    const Longs di;
+    const auto read = hn::Set(d, allowed.read), shot = hn::Set(d, allowed.shot);
+    const auto moving = hn::Set(d, allowed.moving), still = hn::Set(d, allowed.still);
+    const auto unknown = hn::Set(d, std::numeric_limits<float>::infinity());
+    for (size_t at = 0; at < count; at += hn::Lanes(d)) {
+        const Samples sample = load(now + at);
+        const auto sigma = hn::Add(read, hn::Mul(shot, hn::Sqrt(hn::Max(sample.value, hn::Zero(d)))));
+        const auto is_moving = hn::Ne(hn::PromoteTo(di, hn::LoadU(d8, moves + at)), hn::Zero(di));
+        const auto deviations = hn::IfThenElse(hn::RebindMask(d, is_moving), moving, still);
+        hn::StoreU(hn::IfThenElse(sample.is_seen, hn::Mul(deviations, sigma), unknown), d, noise + at);
+    }
+}
+
+// divisors = 1 / (1 + g (T0 / T - 1)). Marks the blocks where any may differ from 1.
+template <typename Sum>
+void compare_in(const Compared<Sum>& knot, size_t count, float* divisors, uint8_t* changes) {
     constexpr float largest_factor = 4;
     const Floats d;
     const auto zero = hn::Zero(d), one = hn::Set(d, 1.0f), scale = hn::Set(d, knot.scale);
@@ -67,6 +91,7 @@ void compare_in(const Compared<Sum>& knot, size_t count, float* divisors) {
         const auto noise_share = hn::Div(noise, difference);
         const auto gain = hn::Mul(hn::Sub(one, hn::Mul(noise_share, noise_share)), hn::Sub(factor, one));
         hn::StoreU(hn::IfThenElse(differs, hn::Div(one, hn::Add(one, gain)), one), d, divisors + at);
+        changes[at / block_samples] |= uint8_t(!hn::AllFalse(d, differs));
     }
 }
 
@@ -84,12 +109,15 @@ void follow_in(const Following& following, Sum* samples) {
         }
 }
 
-#define OLS_FOR_KIND(kind, Sum)                                                     \
-    void compare_##kind(const Compared<Sum>& knot, size_t count, float* divisors) { \
-        compare_in(knot, count, divisors);                                          \
-    }                                                                               \
-    void follow_##kind(const Following& following, Sum* samples) {                  \
-        follow_in(following, samples);                                              \
+#define OLS_FOR_KIND(kind, Sum)                                                                                        \
+    void allow_##kind(const Sum* now, const uint8_t* moves, size_t count, const AllowedNoise& allowed, float* noise) { \
+        allow_in(now, moves, count, allowed, noise);                                                                   \
+    }                                                                                                                  \
+    void compare_##kind(const Compared<Sum>& knot, size_t count, float* divisors, uint8_t* changes) {                  \
+        compare_in(knot, count, divisors, changes);                                                                    \
+    }                                                                                                                  \
+    void follow_##kind(const Following& following, Sum* samples) {                                                     \
+        follow_in(following, samples);                                                                                 \
     }
 OLS_FOR_KIND(shorts, int16_t)
 OLS_FOR_KIND(longs, int32_t)
@@ -103,6 +131,9 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ols {
 
+HWY_EXPORT(allow_shorts);
+HWY_EXPORT(allow_longs);
+HWY_EXPORT(allow_floats);
 HWY_EXPORT(compare_shorts);
 HWY_EXPORT(compare_longs);
 HWY_EXPORT(compare_floats);
@@ -115,28 +146,20 @@ namespace {
 // Of what noise makes of the difference: what is less is taken for noise.
 constexpr double moving_deviations = 1.5, still_deviations = 6;
 
-void compare(const Compared<int16_t>& knot, size_t count, float* divisors) {
-    HWY_DYNAMIC_DISPATCH(compare_shorts)(knot, count, divisors);
-}
-void compare(const Compared<int32_t>& knot, size_t count, float* divisors) {
-    HWY_DYNAMIC_DISPATCH(compare_longs)(knot, count, divisors);
-}
-void compare(const Compared<float>& knot, size_t count, float* divisors) {
-    HWY_DYNAMIC_DISPATCH(compare_floats)(knot, count, divisors);
-}
-void follow(const Following& following, int16_t* samples) {
-    HWY_DYNAMIC_DISPATCH(follow_shorts)(following, samples);
-}
-void follow(const Following& following, int32_t* samples) {
-    HWY_DYNAMIC_DISPATCH(follow_longs)(following, samples);
-}
-void follow(const Following& following, float* samples) {
-    HWY_DYNAMIC_DISPATCH(follow_floats)(following, samples);
-}
-
-bool is_any(const float* divisors) {
-    return std::any_of(divisors, divisors + block_samples, [](float divisor) { return divisor != 1; });
-}
+#define OLS_DISPATCH_KIND(kind, Sum)                                                                            \
+    void allow(const Sum* now, const uint8_t* moves, size_t count, const AllowedNoise& allowed, float* noise) { \
+        HWY_DYNAMIC_DISPATCH(allow_##kind)(now, moves, count, allowed, noise);                                  \
+    }                                                                                                           \
+    void compare(const Compared<Sum>& knot, size_t count, float* divisors, uint8_t* changes) {                  \
+        HWY_DYNAMIC_DISPATCH(compare_##kind)(knot, count, divisors, changes);                                   \
+    }                                                                                                           \
+    void follow(const Following& following, Sum* samples) {                                                     \
+        HWY_DYNAMIC_DISPATCH(follow_##kind)(following, samples);                                                \
+    }
+OLS_DISPATCH_KIND(shorts, int16_t)
+OLS_DISPATCH_KIND(longs, int32_t)
+OLS_DISPATCH_KIND(floats, float)
+#undef OLS_DISPATCH_KIND
 
 // The count that stands ten standard deviations of its noise above black: y = 10 (read + shot sqrt y). Masked ones, the least
 // integer or NaN, are not above it.
@@ -174,31 +197,39 @@ std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t in
 }
 
 template <typename Sum>
-FollowedBrightness<Sum>::FollowedBrightness(const RowBand<Sum>& knots, std::span<const float> light, size_t instant,
+FollowedBrightness<Sum>::FollowedBrightness(const RowBand<Sum>& rows, const BrightnessKnots& knots,
                                             const NoiseModel& noise, std::span<const uint8_t> moves)
-    : divisors_(knots.rows()), blocks_(knots.rows() - 1) {
-    const size_t samples = knots.masked.size(), blocks = (samples + block_samples - 1) / block_samples;
-    const Sum* const now = knots.row(instant);
-    std::vector<float> noises(blocks * block_samples, std::numeric_limits<float>::infinity());
-    for (size_t p = 0; p < samples; ++p) {
-        if (is_masked(now[p])) continue;
-        const double sigma = noise.read_counts + noise.shot * std::sqrt(std::max(0.0, double(now[p])));
-        noises[p] = float((moves[p] ? moving_deviations : still_deviations) * M_SQRT2 * sigma);
-    }
+    : ticks_(knots.ticks), divisors_(rows.rows()), blocks_(rows.rows() - 1) {
+    const auto& [ticks, light, instant] = knots;
+    assert(rows.rows() == ticks.size() && ticks.size() >= 2);
+    const size_t samples = rows.masked.size(), blocks = (samples + block_samples - 1) / block_samples;
+    const Sum* const now = rows.row(instant);
+    const size_t padded = blocks * block_samples;
+    std::vector<uint8_t> is_moving(moves.begin(), moves.end());
+    is_moving.resize(padded);
+    std::vector<float> allowed(padded);
+    allow(now, is_moving.data(), padded,
+          {float(noise.read_counts), float(noise.shot), float(moving_deviations * M_SQRT2),
+           float(still_deviations * M_SQRT2)},
+          allowed.data());
+    std::fill(allowed.begin() + std::ptrdiff_t(samples), allowed.end(), std::numeric_limits<float>::infinity());
+    std::vector<std::vector<uint8_t>> changes(divisors_.size(), std::vector<uint8_t>(blocks));  // by knot
     for (size_t k = 0; k < divisors_.size(); ++k) {
-        divisors_[k].assign(noises.size(), 1.0f);
-        if (k != instant) compare({knots.row(k), now, 1 / light[k], noises.data()}, noises.size(), divisors_[k].data());
+        divisors_[k].assign(padded, 1.0f);
+        if (k != instant)
+            compare({rows.row(k), now, 1 / light[k], allowed.data()}, padded, divisors_[k].data(), changes[k].data());
     }
     for (size_t i = 0; i < blocks_.size(); ++i)
         for (size_t b = 0; b < blocks; ++b)
-            if (is_any(&divisors_[i][b * block_samples]) || is_any(&divisors_[i + 1][b * block_samples]))
-                blocks_[i].push_back(uint32_t(b));
+            if (changes[i][b] || changes[i + 1][b]) blocks_[i].push_back(uint32_t(b));
 }
 
 template <typename Sum>
-void FollowedBrightness<Sum>::apply(const Alignment::Place& place, Sum* samples) const {
-    const size_t i = place.interval;
-    follow({blocks_[i], divisors_[i].data(), divisors_[i + 1].data(), std::clamp(place.fraction, 0.0f, 1.0f)}, samples);
+void FollowedBrightness<Sum>::apply(double tick, Sum* samples) const {
+    size_t i = 0;
+    while (i + 1 < blocks_.size() && ticks_[i + 1] <= tick) ++i;
+    const auto fraction = float((tick - ticks_[i]) / (ticks_[i + 1] - ticks_[i]));
+    follow({blocks_[i], divisors_[i].data(), divisors_[i + 1].data(), std::clamp(fraction, 0.0f, 1.0f)}, samples);
 }
 
 template std::vector<float> relative_light(std::span<const RowBand<int16_t>>, size_t, const NoiseModel&);

@@ -12,7 +12,14 @@
 
 namespace ols {
 
-// By knot: how bright its tracking frame was lit, relative to the target's own, 1 of itself: the median over the pixels that stand
+// The tracking frames that tell brightness, in order.
+struct BrightnessKnots {
+    std::vector<double> ticks;  // middles of their exposures
+    std::vector<float> light;   // relative_light()
+    size_t instant = 0;         // the target's own
+};
+
+// Of each knot, how bright its frame was lit, relative to the target's own, 1 of itself: the median over the pixels that stand
 // at least ten standard deviations of their noise above black in both, which those that changed do not move much. 1 where
 // these are fewer than 64. `bands`: parts of the frames, a row for each knot, brought to the target.
 template <typename Sum>
@@ -36,20 +43,20 @@ std::vector<float> relative_light(std::span<const RowBand<Sum>> bands, size_t in
 template <typename Sum>
 class FollowedBrightness {
   public:
-    // `knots`: the same band as the samples; a row for each knot of the alignment, its tracking frame's samples brought to the
-    // target, in counts above black. `light`: relative_light() of the knots. `instant`: the target's own. `moves`: of each sample, not 0
-    // where it moves (Alignment::moves()).
-    FollowedBrightness(const RowBand<Sum>& knots, std::span<const float> light, size_t instant, const NoiseModel& noise,
+    // `rows`: the same band as the samples; of each knot its frame's samples brought to the target, in counts above black.
+    // `moves`: of each sample, not 0 where it moves (Alignment::moves()).
+    FollowedBrightness(const RowBand<Sum>& rows, const BrightnessKnots& knots, const NoiseModel& noise,
                        std::span<const uint8_t> moves);
 
-    // A slot's samples in the band, brought to the target, padded to a multiple of 16. Masked ones stay. Integers are rounded, half
-    // away from zero, and held to what the inversion takes: 16383 of shorts, 2^23 - 1 of others. The same bits on every SIMD
-    // path.
-    void apply(const Alignment::Place& place, Sum* samples) const;
+    // A slot's samples in the band, brought to the target, padded to a multiple of 16; `tick`: the middle of its exposure. Before
+    // the first knot and after the last their factors stay. Masked samples stay. Integers are rounded, half away from zero, and
+    // held to what the inversion takes: 16383 of shorts, 2^23 - 1 of others. The same bits on every SIMD path.
+    void apply(double tick, Sum* samples) const;
 
   private:
+    std::vector<double> ticks_;                  // of the knots
     std::vector<std::vector<float>> divisors_;   // by knot, of each sample: the factor's inverse
-    std::vector<std::vector<uint32_t>> blocks_;  // by interval: blocks of samples of which some may change within
+    std::vector<std::vector<uint32_t>> blocks_;  // between two knots: blocks of samples of which some may change
 };
 
 }  // namespace ols

@@ -60,6 +60,22 @@ Result<int> tracking_frames_a_target(const Sequence& sequence, double fps) {
                     fps, rate, rates));
 }
 
+std::vector<int> evenly_apart(const Sequence& sequence, int every, double apart_s) {
+    const double between_s = every / tracking_rate_hz(sequence);
+    constexpr double tolerance = 0.01;  // of a part: rates are whole ticks
+    const int parts = apart_s > 0 ? int(std::clamp(between_s / apart_s + tolerance, 1.0, double(every))) : every;
+    std::vector<int> frames;
+    for (int part = 0; part < parts; ++part) frames.push_back((2 * part * every + parts) / (2 * parts));
+    return frames;
+}
+
+uint64_t tracking_frames_before(const Sequence& sequence, uint64_t number) {
+    const std::vector<uint64_t> tracking = tracking_slots(sequence);
+    const uint64_t length = sequence.slots.size();
+    return number / length * tracking.size() +
+           uint64_t(std::ranges::lower_bound(tracking, number % length) - tracking.begin());
+}
+
 std::vector<uint64_t> target_numbers(const Sequence& sequence, int every) {
     const std::vector<uint64_t> tracking = tracking_slots(sequence);
     const auto is_whole = [&](uint64_t target) {

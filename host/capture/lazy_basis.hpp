@@ -22,6 +22,13 @@ double tracking_rate_hz(const Sequence& sequence);
 // there are. No tracking slots.
 Result<int> tracking_frames_a_target(const Sequence& sequence, double fps);
 
+// Of the `every` tracking frames from a target to the next, those that split the time between as evenly as whole frames allow, into
+// as many parts as can last `apart_s` on average: counted from the target's own, which is 0 and the first of them. With 0 all.
+std::vector<int> evenly_apart(const Sequence& sequence, int every, double apart_s);
+
+// How many tracking frames the take has before this one.
+uint64_t tracking_frames_before(const Sequence& sequence, uint64_t number);
+
 // The tracking frames that become targets: from the first one on around which a whole basis was recorded.
 std::vector<uint64_t> target_numbers(const Sequence& sequence, int every);
 

@@ -67,12 +67,14 @@ std::vector<float> light_of(const Rows& tracking, const Frame& like, const Image
 }  // namespace
 
 MotionDeveloper::MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration,
-                                 const NoiseModel& noise, DevelopOptions options, MotionQuality quality)
+                                 const NoiseModel& noise, DevelopOptions options, MotionQuality quality, int every)
     : sequence_(sequence),
       calibration_(calibration),
       noise_(noise),
       options_(options),
       quality_(std::move(quality)),
+      every_(every),
+      flow_frames_(evenly_apart(sequence, every, quality_.flow_apart_s)),
       developer_(sequence, calibration, noise, std::move(options)),
       flows_([&] {
           TrackingFlowOptions flow = quality_.flow;
@@ -104,11 +106,30 @@ TrackingFlows::Reach MotionDeveloper::reach_of(const TargetFrames& frames, bool 
     return reach;
 }
 
-Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
-    const Stopwatch watch(times_.flow);
+// Those that flow leads to and that no earlier target has asked for. Beside one that was lost its neighbours stand in, and the
+// take's first and last are used, or the subject would have to go on as before from farther inside.
+std::vector<const TargetFrames::Tracking*> MotionDeveloper::fresh_tracking(const TargetFrames& frames) const {
+    const auto order = [&](uint64_t number) { return int64_t(tracking_frames_before(sequence_, number)); };
+    const int64_t own = order(frames.basis.target), last = order(sequence_.trigger_count()) - 1;
+    const auto is_chosen = [&](int64_t at) {
+        const int64_t away = (at - own) % every_;
+        return std::ranges::binary_search(flow_frames_, int(away < 0 ? away + every_ : away));
+    };
+    std::vector<int64_t> lost;
+    std::ranges::transform(frames.lost_tracking, std::back_inserter(lost), order);
+    const auto is_used = [&](int64_t at) {
+        const auto stands_in = [&](int64_t missing) { return std::abs(missing - at) == 1 && is_chosen(missing); };
+        return is_chosen(at) || at == 0 || at == last || std::ranges::any_of(lost, stands_in);
+    };
     std::vector<const TargetFrames::Tracking*> fresh;
     for (const auto& one : frames.tracking)
-        if (!last_tracking_ || one.number > *last_tracking_) fresh.push_back(&one);
+        if (is_used(order(one.number)) && (!last_tracking_ || one.number > *last_tracking_)) fresh.push_back(&one);
+    return fresh;
+}
+
+Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
+    const Stopwatch watch(times_.flow);
+    const auto fresh = fresh_tracking(frames);
     std::vector<Image> images(fresh.size()), noise(fresh.size());
     for_each_index(options_.threads, fresh.size(), [&](size_t i) {
         images[i] = tracking_image(*fresh[i]->frame, calibration_.black, calibration_.flat);
@@ -129,23 +150,29 @@ Result<MotionPath> MotionDeveloper::find_path(const TargetFrames& frames) {
 template <typename Sample, typename Sum>
 void MotionDeveloper::follow_brightness(const TargetFrames& frames, const MotionPath& path,
                                         const SignalPlanes<Sample>& black, AlignedRows<Sample, Sum>& aligned) const {
-    const auto frame_at = [&](const MotionKnot& knot) {
-        return std::ranges::find(frames.tracking, knot.tick, [](const auto& one) { return middle_tick(*one.frame); });
-    };
-    const auto instant = std::ranges::find_if(path, &MotionKnot::is_instant);
+    if (!quality_.follows_brightness) return;
+    const double instant = std::ranges::find_if(path, &MotionKnot::is_instant)->tick;
+    BrightnessKnots knots;
+    std::vector<const Frame*> known;
+    bool is_own_known = false;
+    for (const auto& one : frames.tracking) {
+        const double tick = middle_tick(*one.frame);
+        if (tick < path.front().tick || tick > path.back().tick) continue;
+        if (tick == instant) knots.instant = known.size(), is_own_known = true;
+        known.push_back(one.frame.get());
+        knots.ticks.push_back(tick);
+    }
     // Where the target's own tracking frame was lost, nothing tells its brightness.
-    if (!quality_.follows_brightness || path.size() == 1 || frame_at(*instant) == frames.tracking.end()) return;
+    if (!is_own_known || known.size() == 1) return;
     auto tracking = std::make_shared<AlignedRows<Sample, Sum>>();
-    tracking->rows.resize(path.size());
     tracking->alignment = aligned.alignment;
-    for_each_index(options_.threads, path.size(), [&](size_t k) {
-        const auto found = frame_at(path[k]);
-        if (found == frames.tracking.end()) return;
-        auto planes = std::make_shared<SignalPlanes<Sample>>(signal_planes<Sample>(*found->frame, black, false));
-        tracking->rows[k].push_back({.nearer = {std::move(planes), aligned.alignment->place_of(path[k].tick)}});
+    tracking->rows.resize(known.size());
+    for_each_index(options_.threads, known.size(), [&](size_t k) {
+        auto planes = std::make_shared<SignalPlanes<Sample>>(signal_planes<Sample>(*known[k], black, false));
+        tracking->rows[k].push_back({.nearer = {std::move(planes), aligned.alignment->place_of(knots.ticks[k])}});
     });
-    aligned.instant = size_t(instant - path.begin());
-    aligned.tracking_light = light_of(*tracking, *frames.frames.front(), calibration_.black, aligned.instant, noise_);
+    knots.light = light_of(*tracking, *frames.frames.front(), calibration_.black, knots.instant, noise_);
+    aligned.knots = std::move(knots);
     aligned.tracking = std::move(tracking);
     aligned.noise = noise_;
 }

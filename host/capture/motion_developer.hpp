@@ -30,19 +30,23 @@ struct TargetFrames {
     std::vector<MatteFrame> matte;        // nearest_matte_frames()
 };
 
-// Takes targets in their order. Every tracking frame's flow to its neighbours is found once, every basis frame made ready
+// Takes targets in their order. The flow between two tracking frames is found once, every basis frame made ready
 // to be warped once; what no later target needs is dropped, so that memory holds some two cycles of frames.
 class MotionDeveloper {
   public:
-    // References must outlive the developer.
+    // References must outlive the developer. Targets stand at every `every`th tracking frame: which of them flow is found between
+    // is counted from there (MotionQuality::flow_apart_s).
     MotionDeveloper(const Sequence& sequence, const CameraCalibration& calibration, const NoiseModel& noise,
-                    DevelopOptions options, MotionQuality quality);
+                    DevelopOptions options, MotionQuality quality, int every = 1);
     ~MotionDeveloper();
 
     // Errors: those of Developer::develop, and frames too small for flow. Where no tracking frame is near, nothing moves
     // and every pixel is masked (mask_misaligned).
     // `path`, if given, takes the place of the flow that would be found: a true one, to measure what flow errs.
     Result<Target> develop(const TargetFrames& frames, const MotionPath* path = nullptr);
+
+    // The flow that is found. Targets in their order, here too, and each but once.
+    Result<MotionPath> find_path(const TargetFrames& frames);
 
     // Where the time went, of all targets so far, in seconds of the calling thread.
     struct Times {
@@ -75,7 +79,7 @@ class MotionDeveloper {
         std::map<uint64_t, std::shared_ptr<const SignalPlanes<Sample>>> planes;  // by number
     };
 
-    Result<MotionPath> find_path(const TargetFrames& frames);
+    std::vector<const TargetFrames::Tracking*> fresh_tracking(const TargetFrames& frames) const;
     template <typename Sample>
     void prepare_planes(const TargetFrames& frames, Ready<Sample>& ready) const;
     template <typename Sample, typename Sum>
@@ -93,6 +97,8 @@ class MotionDeveloper {
     const NoiseModel noise_;
     const DevelopOptions options_;
     const MotionQuality quality_;
+    const int every_;
+    const std::vector<int> flow_frames_;  // of `every_`, from a target's own on
     Developer developer_;
     TrackingFlows flows_;
     std::optional<uint64_t> last_tracking_;  // whose image `flows_` has

@@ -11,7 +11,11 @@ std::vector<MotionQuality> presets() {
     // In small images patches find what moves far more surely than a pyramid does.
     const FlowOptions quick{DisFlowOptions{.finest_scale = 0, .patch_stride = 5, .iterations = 12, .refinements = 0}};
     return {{},
-            {"preview", true, {.local = quick, .refinement = {}, .reduced_side = 120}, 0.8f},
+            {.name = "preview",
+             .compensates = true,
+             .flow = {.local = quick, .refinement = {}, .reduced_side = 120},
+             .flow_apart_s = 1 / 60.0,
+             .line_tolerance_steps = 1.2f},
             {.name = "standard",
              .compensates = true,
              .flow = {.local = method("brox-half"), .refinement = method("refine-half")},

@@ -16,6 +16,9 @@ struct MotionQuality {
     // Without, frames are taken as they are.
     bool compensates = false;
     TrackingFlowOptions flow = {};
+    // Flow is found between tracking frames that are at least that far apart on average, the targets' own among them however near
+    // they are (evenly_apart() in lazy_basis.hpp), and the subject taken to move evenly between; 0: between all.
+    double flow_apart_s = 0;
     // Runs of samples whose vectors lie that near to a line are warped along it (group_motion.hpp).
     float line_tolerance_steps = GroupMotion::default_tolerance;
     // Whether samples follow the brightness of the tracking frames where alignment leaves it different

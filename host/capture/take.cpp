@@ -123,7 +123,7 @@ class TakeWriter {
           archive_(archive),
           developer_(sequence, calibration.cameras[0], stage.cameras[0].noise, {masks.estimate, stage.lamps}),
           motion_developer_(sequence, calibration.cameras[0], stage.cameras[0].noise, {masks.estimate, stage.lamps},
-                            targets.quality),
+                            targets.quality, std::max(targets.every, 1)),
           plan_(sequence, masks, targets),
           store_(sequence),
           missing_(sequence),

@@ -3,6 +3,7 @@
 #include "reflectance/dis_flow.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <vector>
@@ -81,9 +82,11 @@ void refine(const cv::Mat& from, const cv::Mat& to, const DisFlowOptions& option
 }
 
 // DIS knows no masks: what is not seen moves as the nearest pixel that is, smoothed, or every pixel of an outline would draw a
-// border of its own through all that lies beyond it.
+// border of its own through all that lies beyond it. What is twice as far from that pixel as it gets in `links` links as long as
+// this one, half a cycle and more, stands still.
 void follow_seen(const Image& seen, FlowField& flow) {
-    constexpr double smoothing = 4;  // pixels
+    constexpr double smoothing = 4;              // pixels
+    constexpr float links = 6, least_reach = 2;  // pixels
     if (seen.data.empty()) return;
     cv::Mat unseen(seen.height, seen.width, CV_8U), distance, nearest;
     for (int y = 0; y < seen.height; ++y)
@@ -92,16 +95,22 @@ void follow_seen(const Image& seen, FlowField& flow) {
     std::vector<size_t> place(flow.size() + 1, flow.size());  // of the seen pixel of each label
     for (size_t p = 0; p < flow.size(); ++p)
         if (unseen.data[p] == 0) place[size_t(nearest.ptr<int>()[p])] = p;
-    for (std::vector<float>* const plane : {&flow.u, &flow.v}) {
-        std::vector<float> filled = *plane;
+    const auto smoothed = [&](const std::vector<float>& plane) {
+        std::vector<float> filled = plane;
         for (size_t p = 0; p < flow.size(); ++p)
-            if (const size_t from = place[size_t(nearest.ptr<int>()[p])]; from < flow.size())
-                filled[p] = (*plane)[from];
+            if (const size_t from = place[size_t(nearest.ptr<int>()[p])]; from < flow.size()) filled[p] = plane[from];
         cv::Mat smooth;
         cv::GaussianBlur(cv::Mat(flow.height, flow.width, CV_32F, filled.data()), smooth, {0, 0}, smoothing, smoothing,
                          cv::BORDER_REPLICATE);
-        for (size_t p = 0; p < flow.size(); ++p)
-            if (unseen.data[p] != 0) (*plane)[p] = smooth.ptr<float>()[p];
+        return smooth;
+    };
+    const cv::Mat smooth_u = smoothed(flow.u), smooth_v = smoothed(flow.v);
+    for (size_t p = 0; p < flow.size(); ++p) {
+        if (unseen.data[p] == 0) continue;
+        const float u = smooth_u.ptr<float>()[p], v = smooth_v.ptr<float>()[p];
+        const float reach = links * std::hypot(u, v) + least_reach;
+        const float share = std::clamp(2 - distance.ptr<float>()[p] / reach, 0.0f, 1.0f);
+        flow.u[p] = share * u, flow.v[p] = share * v;
     }
 }
 

@@ -19,6 +19,7 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 // clang-format on
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -368,6 +369,8 @@ HWY_INLINE bool warp_line(const CountPlane& source, const RunLines& row, int run
     const LaneVector start_x = hn::Set(d, row.x[run]), dx = hn::Set(d, row.dx[run]);
     const LaneVector start_y = hn::Set(d, row.y[run]), dy = hn::Set(d, row.dy[run]);
     const size_t pitch = source.pitch * step, third_row = size_t(row.rows[run]) * pitch;
+    // A cache line has the counts of two runs: one of them asks for the row above, one for that below.
+    if (source.next) hwy::Prefetch(source.next + row.offset[run] + (run % 2 ? pitch : 0));
     for (int k = 0; k < run_samples; k += int(hn::Lanes(d))) {
         const LaneVector samples = hn::Iota(d, int16_t(k));
         const LaneVector x = hn::Add(start_x, hn::Mul(samples, dx)), y = hn::Add(start_y, hn::Mul(samples, dy));

@@ -17,6 +17,9 @@ struct CountPlane {
     int largest = 4095;        // |count| at most: up to 4095 two more bits are kept while interpolating
     bool holds_edges = false;  // a position outside takes the nearest count of the edge
     int margin = 0;            // with holds_edges: as many columns and rows beyond each edge may be read, and repeat it
+    // Of the plane that is warped next, of the same grid, pitch and margin: what lies there where this one is read is fetched from
+    // memory meanwhile. May be null.
+    const int16_t* next = nullptr;
 };
 
 struct RowRange {

@@ -73,10 +73,7 @@ double AlignLimit::psnr_db(const Moved& moved_to, Where where) const {
 
 Image AlignLimit::moved(const Moment& moment, const MotionPath& path) const {
     const auto instant = std::ranges::find_if(path, &MotionKnot::is_instant);
-    const auto knot = std::ranges::find_if(
-        path, [&](const MotionKnot& one) { return std::abs(one.tick - instant->tick - moment.tick) < 1; });
-    assert(knot != path.end());
-    return led(moment.image, resized(knot->flow, truth_.width, truth_.height));
+    return led(moment.image, resized(flow_at(path, instant->tick + moment.tick), truth_.width, truth_.height));
 }
 
 const AlignLimit::Moment* AlignLimit::across(const Moment& moment) const {

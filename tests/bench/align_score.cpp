@@ -7,7 +7,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "capture/tracking_image.hpp"
 #include "true_flow.hpp"
 
 namespace ols {
@@ -162,18 +161,10 @@ MotionPath true_path(const Recording& recording, size_t target) {
 }
 
 Result<MotionPath> found_path(const Recording& recording, size_t target, const MotionQuality& quality) {
-    const TargetFrames& frames = recording.targets[target];
-    TrackingFlows flows(quality.flow);
-    for (const TargetFrames::Tracking& one : frames.tracking) {
-        const CameraCalibration& calibration = recording.calibration;
-        const Status added =
-            flows.add(middle_tick(*one.frame), tracking_image(*one.frame, calibration.black, calibration.flat),
-                      tracking_noise(*one.frame, calibration.black, calibration.flat, recording.camera().noise));
-        if (!added) return added.error();
-    }
-    return flows.path(MotionDeveloper::instant_of(frames, recording.sequence),
-                      MotionDeveloper::reach_of(frames, quality.interpolates),
-                      MotionDeveloper::reach_of(frames, false));
+    DevelopOptions options;
+    options.threads = 1;
+    MotionDeveloper developer = developer_of(recording, quality, options);
+    return developer.find_path(recording.targets[target]);
 }
 
 namespace {
@@ -192,6 +183,22 @@ size_t instant_of(const MotionPath& path) {
 
 }  // namespace
 
+FlowField flow_at(const MotionPath& path, double tick) {
+    constexpr double rounding = 1;  // ticks
+    const auto after = std::ranges::find_if(path, [&](const MotionKnot& knot) { return knot.tick > tick - rounding; });
+    assert(after != path.end());
+    if (std::abs(after->tick - tick) < rounding) return after->flow;
+    assert(after != path.begin());
+    const auto before = std::prev(after);
+    const auto share = float((tick - before->tick) / (after->tick - before->tick));
+    FlowField flow = before->flow;
+    for (size_t p = 0; p < flow.size(); ++p) {
+        flow.u[p] += share * (after->flow.u[p] - flow.u[p]);
+        flow.v[p] += share * (after->flow.v[p] - flow.v[p]);
+    }
+    return flow;
+}
+
 PathError path_error(const MotionPath* found, const MotionPath& truth, Knots knots, double cycle_ticks,
                      const std::vector<unsigned char>& subject) {
     const size_t instant = instant_of(truth);
@@ -202,9 +209,7 @@ PathError path_error(const MotionPath* found, const MotionPath& truth, Knots kno
         const FlowField& exact = truth[k].flow;
         FlowField estimate(exact.width, exact.height);
         if (found) {
-            const auto same = std::ranges::find(*found, truth[k].tick, &MotionKnot::tick);
-            assert(same != found->end());
-            estimate = resized(same->flow, exact.width, exact.height);
+            estimate = resized(flow_at(*found, truth[k].tick), exact.width, exact.height);
         }
         for (size_t p = 0; p < exact.size(); ++p)
             if (subject[p] && truth[k].confidence[p] > 0)

@@ -183,6 +183,13 @@ Result<Recording> record(const RecordingPlan& plan, const std::string& folder) {
     return recording;
 }
 
+MotionDeveloper developer_of(const Recording& recording, const MotionQuality& quality, DevelopOptions options) {
+    const auto is_tracking = [](const Slot& slot) { return slot.kind == SlotKind::tracking; };
+    const auto every = int(std::ranges::count_if(recording.sequence.slots, is_tracking)) / 2;
+    return {recording.sequence, recording.calibration, recording.camera().noise, std::move(options), quality,
+            std::max(every, 1)};
+}
+
 Result<std::vector<std::vector<float>>> true_lamps(const Recording& recording, const RecordingPlan& plan,
                                                    const std::string& folder) {
     const size_t pixels = size_t(plan.width) * size_t(plan.height), count = recording.stage.lamps.size();

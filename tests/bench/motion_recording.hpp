@@ -42,6 +42,9 @@ struct Recording {
 // Errors: those of the scene and the basis; the folder cannot be written.
 Result<Recording> record(const RecordingPlan& plan, const std::string& folder);
 
+// For its targets, half a cycle from one to the next.
+MotionDeveloper developer_of(const Recording& recording, const MotionQuality& quality, DevelopOptions options = {});
+
 // What each lamp alone shows at the first target's moment, in r (docs/architecture.md, "Units"): [lamp][pixel], a mosaic
 // like the frames. Kept like them, once for all bases.
 Result<std::vector<std::vector<float>>> true_lamps(const Recording& recording, const RecordingPlan& plan,

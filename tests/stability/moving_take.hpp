@@ -57,8 +57,8 @@ struct Layer {
     Vec3 normal = {0, 0, 1};
     std::function<double(int)> shine = {};
     double board = 0;  // r under the matte board's lamps, times albedo
-    double brightening_a_slot =
-        0;  // of the albedo, relative, counted from the first tracking frame of the middle cycle
+    // Of the albedo, relative, after so many slots from the first tracking frame of the middle cycle; none: 1.
+    std::function<double(double)> brightness = {};
 };
 
 struct Scene {
@@ -76,13 +76,14 @@ inline std::vector<Image> seen_layers(const Scene& scene, double slots) {
     std::vector<Image> seen;
     for (const Layer& layer : scene.layers) {
         const Offset at = layer.offset ? layer.offset(slots) : Offset{};
+        const double brightness = layer.brightness ? layer.brightness(slots) : 1;
         Image& own = seen.emplace_back(scene.width, scene.height, 1);
         for (int y = 0; y < scene.height; ++y)
             for (int x = 0; x < scene.width; ++x) {
                 const double dx = x - 0.5 * (scene.width - 1) - at.x, dy = y - 0.5 * (scene.height - 1) - at.y;
                 const double cover = std::clamp(layer.radius + 0.5 - std::hypot(dx, dy), 0.0, 1.0);
                 if (cover == 0) continue;
-                own.at(x, y) = float(cover * layer.albedo(dx, dy) * (1 + layer.brightening_a_slot * slots));
+                own.at(x, y) = float(cover * layer.albedo(dx, dy) * brightness);
                 for (size_t below = 0; below + 1 < seen.size(); ++below) seen[below].at(x, y) *= float(1 - cover);
             }
     }
@@ -122,8 +123,10 @@ class Take {
         return store.around(0, target);
     }
 
+    // For targets at every fifth tracking frame from the middle one, 24 a second.
     MotionDeveloper developer(const std::string& quality, DevelopOptions options = {}) const {
-        return {sequence_, calibration_, noise_, std::move(options), *motion_quality(quality)};
+        constexpr int every = 5;
+        return {sequence_, calibration_, noise_, std::move(options), *motion_quality(quality), every};
     }
 
     Target develop(const std::string& quality, uint64_t target, DevelopOptions options = {}) {

@@ -119,6 +119,22 @@ TEST_P(HardFlow, reads_nothing_from_saturated_pixels) {
     EXPECT_LT(longest(told), 10);
 }
 
+// A disc of texture that moves before nothing: what lies near goes along, what it does not come to stands still.
+TEST_P(HardFlow, leaves_what_is_far_from_all_that_is_seen) {
+    FlowScene scene = moving_plane(2, 0);
+    for (Image* image : {&scene.from, &scene.to})
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x)
+                if (std::hypot(x - 60, y - 80) > 30) image->at(x, y) = std::numeric_limits<float>::quiet_NaN();
+    const FlowField flow = estimate(scene.from, scene.to);
+    const auto u = [&](int x) { return flow.u[size_t(80 * width + x)]; };
+    EXPECT_NEAR(u(60), 2, 0.5);
+    EXPECT_NEAR(u(60 + 34), 2, 0.5) << "4 pixels from the disc";
+    if (!ours()) {
+        EXPECT_EQ(u(60 + 30 + 40), 0) << "twice as far as it comes in six links";
+    }
+}
+
 TEST_P(HardFlow, bridges_pixels_that_are_no_numbers) {
     FlowScene scene = moving_plane(2, 2);
     for (size_t p = 0; p < scene.from.data.size(); p += 97) {

@@ -201,3 +201,23 @@ TEST(LazyBasis, has_targets_at_whole_parts_of_the_tracking_rate) {
     EXPECT_FALSE(tracking_frames_a_target(without, 24).ok());
     EXPECT_TRUE(target_numbers(without, 1).empty());
 }
+
+TEST(LazyBasis, splits_the_time_between_targets_as_evenly_as_whole_frames_allow) {
+    const Sequence& sequence = sequence_of("single");
+    using Frames = std::vector<int>;
+    EXPECT_EQ(evenly_apart(sequence, 5, 0), (Frames{0, 1, 2, 3, 4}));
+    EXPECT_EQ(evenly_apart(sequence, 5, 1 / 60.0), (Frames{0, 3})) << "25 ms and 17 ms: three parts would be too short";
+    EXPECT_EQ(evenly_apart(sequence, 4, 1 / 60.0), (Frames{0, 2}));
+    EXPECT_EQ(evenly_apart(sequence, 5, 1 / 80.0), (Frames{0, 2, 3}));
+    EXPECT_EQ(evenly_apart(sequence, 2, 1 / 60.0), (Frames{0}));
+    EXPECT_EQ(evenly_apart(sequence, 1, 1 / 60.0), (Frames{0})) << "targets are as near as they are";
+}
+
+TEST(LazyBasis, counts_the_tracking_frames_before_one) {
+    const Sequence& sequence = sequence_of("single");
+    uint64_t count = 0;
+    for (uint64_t number = 0; number < 400; ++number) {
+        EXPECT_EQ(tracking_frames_before(sequence, number), count) << number;
+        count += sequence.slots[number % 180].kind == SlotKind::tracking;
+    }
+}

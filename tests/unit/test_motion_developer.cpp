@@ -55,7 +55,7 @@ TEST(MotionDeveloper, leaves_every_bit_of_a_subject_whose_flow_is_zero) {
 // dark; half a cycle off by a tenth.
 TEST(MotionDeveloper, finds_light_that_changes_evenly_between_the_frames_before_and_after) {
     Layer card = moving_disc(20);
-    card.brightening_a_slot = 0.2 / 180;
+    card.brightness = [](double slots) { return 1 + 0.2 * slots / 180; };
     Scene without_noise = scene({{even(0)}, card}, false);
     Take take(without_noise, "single");
     std::vector<bool> inside;
@@ -88,9 +88,63 @@ TEST(MotionDeveloper, gives_the_same_bits_on_one_thread_and_on_two) {
 TEST(MotionDeveloper, gives_a_target_the_same_bits_whichever_came_before) {
     Take take(scene({{wavy(5)}, moving_disc(20)}), "single");
     const uint64_t target = take.middle_target();
-    MotionDeveloper developer = take.developer("standard");
-    for (const uint64_t before : {target - 36, target - 18}) ASSERT_TRUE(developer.develop(take.around(before)).ok());
-    expect_equal(*developer.develop(take.around(target)), take.develop("standard", target));
+    // With flow between all tracking frames; and between some, which are counted from every fifth.
+    for (const auto& [quality, apart] : {std::pair("standard", 18), std::pair("preview", 90)}) {
+        MotionDeveloper developer = take.developer(quality);
+        for (const int before : {2, 1})
+            ASSERT_TRUE(developer.develop(take.around(target - uint64_t(before * apart))).ok());
+        expect_equal(*developer.develop(take.around(target)), take.develop(quality, target));
+    }
+}
+
+// The tracking frames that flow leads to, counted from the target's.
+std::vector<long> flow_frames(Take& take, MotionDeveloper& developer, uint64_t target) {
+    std::vector<long> frames;
+    const MotionPath path = *developer.find_path(take.around(target));
+    const auto tick = double(target) * 57870;
+    for (const MotionKnot& knot : path) frames.push_back(std::lround((knot.tick - tick) / (18 * 57870)));
+    return frames;
+}
+
+// At 24 targets a second every fifth tracking frame is one: flow leads from there over the third between them.
+TEST(MotionDeveloper, finds_flow_between_tracking_frames_as_far_apart_as_its_quality_says) {
+    Take take(scene({{wavy(5)}, moving_disc(20)}), "single");
+    const uint64_t target = take.middle_target();
+    MotionDeveloper preview = take.developer("preview"), standard = take.developer("standard");
+    const std::vector<long> apart = {-5, -2, 0, 3, 5};
+    EXPECT_EQ(flow_frames(take, preview, target - 90), (std::vector<long>{-5, -2, 0, 3, 5}));
+    EXPECT_EQ(flow_frames(take, preview, target), apart) << "whichever target came before";
+    const std::vector<long> all = flow_frames(take, standard, target);
+    for (long k = -5; k <= 5; ++k) EXPECT_NE(std::ranges::find(all, k), all.end()) << k;
+}
+
+TEST(MotionDeveloper, finds_flow_to_the_neighbours_of_a_frame_that_was_lost_and_to_the_takes_ends) {
+    Scene disc = scene({{wavy(5)}, moving_disc(3)});
+    disc.width = 48, disc.height = 40;
+    const uint64_t target = Take(disc, "single").middle_target();
+    const auto frames = [&](const std::set<uint64_t>& lost, uint64_t at) {
+        Take take(disc, "single", lost);
+        MotionDeveloper preview = take.developer("preview");
+        return flow_frames(take, preview, at);
+    };
+    EXPECT_EQ(frames({target}, target), (std::vector<long>{-5, -2, -1, 0, 1, 3, 5}));
+    EXPECT_EQ(frames({target + 3 * 18}, target), (std::vector<long>{-5, -2, 0, 2, 4, 5}));
+    EXPECT_EQ(frames({target + 18}, target), (std::vector<long>{-5, -2, 0, 3, 5})) << "no flow leads there anyway";
+    const uint64_t last = target + 15 * 18;  // of the third cycle, whose last tracking frame is the fourth after it
+    EXPECT_EQ(frames({}, last), (std::vector<long>{-5, -2, 0, 3, 4}));
+}
+
+// A disc that is darker about one tracking frame only, which no flow leads to.
+TEST(MotionDeveloper, follows_the_brightness_of_tracking_frames_that_flow_leaves_out) {
+    Layer dimmed = moving_disc(0);
+    dimmed.brightness = [](double slots) { return 1 - std::max(0.0, 0.6 * (1 - std::abs(slots - 18) / 18)); };
+    Take take(scene({{even(0.3)}, dimmed}, false), "single");
+    std::vector<bool> inside;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 80; ++x) inside.push_back(std::hypot(x - 39.5, y - 31.5) < 15);
+    const uint64_t target = take.middle_target();
+    const double none = take.error(take.develop("none", target), target, inside);
+    EXPECT_LT(take.error(take.develop("preview", target), target, inside), none / 5);
 }
 
 TEST(MotionDeveloper, keeps_no_more_the_longer_a_take_is) {
@@ -104,9 +158,9 @@ TEST(MotionDeveloper, keeps_no_more_the_longer_a_take_is) {
         const char* quality;
         unsigned bases, tracking_frames;
     };
-    for (const auto& [quality, bases, tracking_frames] : {Bound{"preview", 1, 22}, Bound{"standard", 2, 32}}) {
+    for (const auto& [quality, bases, tracking_frames] : {Bound{"preview", 1, 12}, Bound{"standard", 2, 32}}) {
         MotionDeveloper developer = take.developer(quality);
-        for (size_t i = 0; i < 50; i += bases) {
+        for (size_t i = 0; i < 50; i += 5) {
             ASSERT_TRUE(developer.develop(take.around(targets[i])).ok());
             const MotionDeveloper::Kept kept = developer.kept();
             EXPECT_LE(kept.basis_frames, 156 * bases);

@@ -11,6 +11,7 @@
 
 #include "align_limit.hpp"
 #include "align_score.hpp"
+#include "capture/tracking_image.hpp"
 
 using namespace ols;
 
@@ -207,19 +208,39 @@ TEST_F(MotionRecording, motion_of_a_cycle_is_that_of_the_ball_and_without_a_flow
     EXPECT_EQ(moving_pixels(still, ball), hidden);
 }
 
-TEST_F(MotionRecording, path_as_it_is_found_makes_the_target_that_the_developer_makes) {
+TEST_F(MotionRecording, path_that_is_found_is_that_of_all_tracking_frames) {
     const auto recording = record(plan_, "");
-    MotionQuality quality = *motion_quality("standard");
-    const auto developed = [&](const MotionPath* path) {
-        MotionDeveloper developer(recording->sequence, recording->calibration, recording->camera().noise, {}, quality);
-        return developer.develop(recording->targets[0], path);
-    };
+    const MotionQuality quality = *motion_quality("standard");
     const auto path = found_path(*recording, 0, quality);
     ASSERT_TRUE(path) << path.error().message;
-    const auto own = developed(nullptr), given = developed(&*path);
-    ASSERT_TRUE(own && given);
-    EXPECT_EQ(own->lamps, given->lamps);
-    EXPECT_EQ(own->confidence, given->confidence);
+    TrackingFlows flows(quality.flow);
+    const TargetFrames& frames = recording->targets[0];
+    const CameraCalibration& calibration = recording->calibration;
+    for (const auto& [number, frame] : frames.tracking)
+        ASSERT_TRUE(flows
+                        .add(middle_tick(*frame), tracking_image(*frame, calibration.black, calibration.flat),
+                             tracking_noise(*frame, calibration.black, calibration.flat, recording->camera().noise))
+                        .ok());
+    const auto expected = flows.path(MotionDeveloper::instant_of(frames, recording->sequence),
+                                     MotionDeveloper::reach_of(frames, true), MotionDeveloper::reach_of(frames, false));
+    ASSERT_TRUE(expected && expected->size() == path->size());
+    for (size_t k = 0; k < path->size(); ++k) {
+        EXPECT_EQ((*path)[k].tick, (*expected)[k].tick);
+        EXPECT_EQ((*path)[k].flow.u, (*expected)[k].flow.u);
+        EXPECT_EQ((*path)[k].confidence, (*expected)[k].confidence);
+    }
+}
+
+TEST(FlowAt, is_in_a_line_between_two_knots) {
+    MotionPath path;
+    for (const double tick : {-3e6, 0.0, 2e6})
+        path.push_back({tick, FlowField(16, 16), std::vector<float>(256, 1.0f), tick == 0});
+    std::ranges::fill(path[0].flow.u, -6.0f);
+    std::ranges::fill(path[2].flow.v, 8.0f);
+    EXPECT_EQ(flow_at(path, -1e6).u[7], -2);
+    EXPECT_EQ(flow_at(path, 0).v[7], 0);
+    EXPECT_EQ(flow_at(path, 1.5e6).v[7], 6);
+    EXPECT_EQ(flow_at(path, 2e6).v[7], 8);
 }
 
 TEST_F(MotionRecording, limit_without_a_flow_is_the_error_of_the_frames_as_they_stand) {
