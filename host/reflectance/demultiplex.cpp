@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A plan of additions where the basis has a known structure (hadamard_plan.hpp); a factor where each row is an image of its own
-// (single lamps, scaled_row.hpp); for any other a matrix product by OpenBLAS, in blocks of samples that stay in the second-level cache
-// (159 rows x 256 samples x 4 bytes = 163 KB). Integer weights are exact in all: sums of whole numbers below 2^24 are exact in
-// float, whatever their order, and below 2^53 in double.
+// (single lamps, scaled_row.hpp); for any other a matrix product by OpenBLAS, in blocks of samples that stay in the
+// second-level cache (159 rows x 256 samples x 4 bytes = 163 KB). Integer weights are exact in all: sums of whole numbers below
+// 2^24 are exact in float, whatever their order, and below 2^53 in double.
 #include "reflectance/demultiplex.hpp"
 
 #include <cblas.h>

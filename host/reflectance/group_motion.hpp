@@ -64,8 +64,8 @@ class GroupMotion {
         return index < 0 ? nullptr : &own_[size_t(index)];
     }
 
-    // Sets marks[y * grid().width + x] to 1 for the samples of every run that does not lie on a line along which nothing moves, at any
-    // fraction of the step; the others stay.
+    // Sets marks[y * grid().width + x] to 1 for the samples of every run that does not lie on a line along which nothing moves,
+    // at any fraction of the step; the others stay.
     void mark_moving(std::span<uint8_t> marks) const;
 
     // The vectors of row y at a fraction of the step: grid().width values each.

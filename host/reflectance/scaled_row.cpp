@@ -10,34 +10,23 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 // clang-format on
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
+
+#include "reflectance/tile_sink_inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ols {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::CappedTag<float, 16>;
-
 HWY_INLINE auto values_of(const float* row) {
     return hn::LoadU(Floats(), row);
 }
 HWY_INLINE auto values_of(const int32_t* row) {
-    return hn::ConvertTo(Floats(), hn::LoadU(hn::RebindToSigned<Floats>(), row));
+    return hn::ConvertTo(Floats(), hn::LoadU(Longs(), row));
 }
 HWY_INLINE auto values_of(const int16_t* row) {
-    const auto counts = hn::LoadU(hn::Rebind<int16_t, Floats>(), row);
-    return hn::ConvertTo(Floats(), hn::PromoteTo(hn::RebindToSigned<Floats>(), counts));
-}
-
-// There are instructions to stream vectors of 16 bytes or more.
-template <class V>
-HWY_INLINE void write(V value, bool is_aligned, float* to) {
-    const Floats d;
-    if constexpr (hn::MaxLanes(Floats()) >= 4)
-        if (is_aligned) return hn::Stream(value, d, to);
-    hn::StoreU(value, d, to);
+    return hn::ConvertTo(Floats(), hn::PromoteTo(Longs(), hn::LoadU(hn::Rebind<int16_t, Longs>(), row)));
 }
 
 // Float holds the weight and the samples, so that their product is rounded once, as from double.
@@ -50,7 +39,10 @@ void scale(const Sample* row, size_t samples, const RowScale& by, float* out) {
     for (; p + hn::Lanes(d) <= samples; p += hn::Lanes(d)) {
         auto value = hn::Mul(hn::Mul(weight, values_of(row + p)), hn::LoadU(d, by.factors + p));
         if (by.offsets) value = hn::Sub(value, hn::LoadU(d, by.offsets + p));
-        write(value, is_aligned, out + p);
+        if (is_aligned)
+            write_past(value, d, out + p);
+        else
+            hn::StoreU(value, d, out + p);
     }
     for (; p < samples; ++p) {
         const float value = float(by.weight) * float(row[p]) * by.factors[p];

@@ -60,7 +60,8 @@ class TrackingFlows {
     // From the instant to the tracking frames from the last at or before reach.from to the first at or after reach.to, as far
     // as there are any; those that are needed for times within `refined` are refined, what lies farther stands as it is
     // concatenated. The instant is that of a tracking frame, or between two (one was lost): there the subject is taken to move
-    // evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with itself. Flows between neighbours are kept for the next instant.
+    // evenly from one to the other, and nothing is refined. An instant outside all tracking frames is alone with itself. Flows
+    // between neighbours are kept for the next instant.
     Result<MotionPath> path(double instant, const Reach& reach, const Reach& refined);
     Result<MotionPath> path(double instant, double from, double to) { return path(instant, {from, to}, {from, to}); }
 

@@ -30,8 +30,9 @@ struct RowRange {
 // out[(y - range.first) * out_pitch + x] = the bilinear mean of the four counts around the position, rounded. A position outside
 // the frame (unless it holds its edges), or one of whose counts with a weight above zero is masked, is masked. |counts| <= 16383;
 // up to 4095 interpolation keeps two more bits. Integer arithmetic but for the position: the same bits on every SIMD path and
-// for any range. A margin makes it faster where motion leads out; there a run may lie on a line that else keeps its own vectors. Where the position is on a line it is within 2^-10
-// steps of it. The grid is the motion's. False where it is known that no count that was written is masked.
+// for any range. A margin makes it faster where motion leads out; there a run may lie on a line that else keeps its own
+// vectors. Where the position is on a line it is within 2^-10 steps of it. The grid is the motion's. False where it is known
+// that no count that was written is masked.
 bool warp_counts(const CountPlane& source, const GroupMotion& motion, float fraction, const RowRange& range,
                  int16_t* out, size_t out_pitch);
 // All rows.

@@ -64,8 +64,8 @@ MotionPath true_path(const Recording& recording, size_t target);
 // The flow to a time between two of a path's knots, or at one.
 FlowField flow_at(const MotionPath& path, double tick);
 
-// The endpoint error in pixels of a found path at the true one's knots next to the target, or half a cycle from it, on either side, over the
-// subject's pixels that are visible there. `found` null: of no flow, which is the length of the true one.
+// The endpoint error in pixels of a found path at the true one's knots next to the target, or half a cycle from it, on either
+// side, over the subject's pixels that are visible there. `found` null: of no flow, which is the length of the true one.
 struct PathError {
     double mean = 0, percentile_95 = 0;
 };
@@ -82,7 +82,7 @@ CycleMotion cycle_motion(const MotionPath& truth, double cycle_ticks, const std:
 // The subject's pixels that move by more than a quarter of a pixel from the target to any knot, or are hidden there.
 std::vector<unsigned char> moving_pixels(const MotionPath& truth, const std::vector<unsigned char>& subject);
 
-// The path that a quality finds for a target.
+// The path that a quality finds for a target, on one thread.
 Result<MotionPath> found_path(const Recording& recording, size_t target, const MotionQuality& quality);
 
 }  // namespace ols

@@ -86,9 +86,7 @@ Result<const MotionPath*> Takes::found(const Take& take, const std::string& qual
     const auto& tracking = take.recording.targets[0].tracking;
     for (const auto& found : paths_[quality])
         if (same_frames(found->tracking, tracking)) return &found->path;
-    MotionQuality one_thread = *motion_quality(quality);
-    one_thread.flow.threads = 1;
-    auto path = found_path(take.recording, 0, one_thread);
+    auto path = found_path(take.recording, 0, *motion_quality(quality));
     if (!path) return path.error();
     paths_[quality].push_back(std::make_unique<Found>(Found{tracking, std::move(*path)}));
     return &paths_[quality].back()->path;

@@ -121,8 +121,8 @@ void measure_relit(Bench& bench, const std::string& name, const Take* take, cons
             "pixels a cycle. Left to right: as recorded; `standard` with flow alone, then following the tracking "
             "frames' brightness, both from the frames nearest in time only ([motion.md](motion.md)); `preview`; "
             "`standard` with flow between only as many tracking frames as `preview` takes; `standard`; `final`; "
-            "`final` with the scene's own geometry in place of a flow; and a subject that stands still in the target's "
-            "pose: noise and saturation alone, the most that there is to gain.",
+            "`final` with the scene's own geometry in place of a flow; and a subject that stands still in the "
+            "target's pose: noise and saturation alone, the most that there is to gain.",
         .figures = {}};
     measure_targets(bench, line, targets,
                     [&](const Target& target) { return percent_of_peak(take->truth->psnr_db(target)); });
@@ -132,11 +132,9 @@ void measure_relit(Bench& bench, const std::string& name, const Take* take, cons
 void measure_banding(Bench& bench, const std::string& basis, const Take* take, const Targets& targets) {
     const std::string note =
         "**A blink, and what multiplexing makes of it.** Of the pixels that the lids pass only: rms error of what is "
-        "relit "
-        "(mean over the three lightings) and of the single images. `frozen` is noise alone. A basis of single lamps "
-        "gets "
-        "each lamp's lid at another height; a multiplexed one spreads each height over all lamps as plus and minus "
-        "([motion.md](motion.md)).";
+        "relit (mean over the three lightings) and of the single images. `frozen` is noise alone. A basis of single "
+        "lamps gets each lamp's lid at another height; a multiplexed one spreads each height over all lamps as plus "
+        "and minus ([motion.md](motion.md)).";
     const auto moving = take ? moving_pixels(take->true_path, take->truth->subject()) : std::vector<unsigned char>();
     const auto line = [&](const std::string& what) {
         return Line{.name = basis + ", " + what, .unit = "%", .table = "lids, % of peak", .note = note, .figures = {}};
@@ -149,17 +147,12 @@ void measure_banding(Bench& bench, const std::string& basis, const Take* take, c
 
 constexpr const char* limit_note =
     "**What no flow mends.** The scene in full colour under the key light, without noise, mosaic or basis, at the "
-    "moments of "
-    "the tracking frames half a cycle around the target's, each moved to it, where the point can be seen at both; and "
-    "of "
-    "these pixels only those that are three or more from any other. All but `preview` and `true flow, nearer` are "
-    "blended with "
-    "the moment a cycle away across the target, as `standard` and `final` do. What the true flow leaves is shading "
-    "that does not change evenly (highlights, edges of shadows), interpolation, and outlines, whose pixels mix what "
-    "moves "
-    "with what does not. A found flow may be nearer than the true one: it follows what pictures show, where shading "
-    "stays "
-    "with the lamps while the surface moves, and outlines as they are drawn.";
+    "moments of the tracking frames half a cycle around the target's, each moved to it, where the point can be seen "
+    "at both; and of these pixels only those that are three or more from any other. All but `preview` and `true flow, "
+    "nearer` are blended with the moment a cycle away across the target, as `standard` and `final` do. What the true "
+    "flow leaves is shading that does not change evenly (highlights, edges of shadows), interpolation, and outlines, "
+    "whose pixels mix what moves with what does not. A found flow may be nearer than the true one: it follows what "
+    "pictures show, where shading stays with the lamps while the surface moves, and outlines as they are drawn.";
 
 // What flow does for a scene where nothing else is in its way.
 void measure_limit(Bench& bench, Takes& takes, const MovingScene& scene, const Take* take) {
@@ -205,11 +198,10 @@ void measure_flow(Bench& bench, Takes& takes, const MovingScene& scene, const Ta
             .unit = "px",
             .table = "endpoint error of the flow, px",
             .note =
-                "**Flow, and its drift.** From the target to the next tracking frame on either side, 8 ms away, and to "
-                "half a cycle away, 42 ms and five links of the concatenation (two with `preview`, which takes the "
+                "**Flow, and its drift.** From the target to the next tracking frame on either side, 8 ms away, and "
+                "to half a cycle away, 42 ms and five links of the concatenation (two with `preview`, which takes the "
                 "subject to move evenly between), where the subject is visible at both. `none` is the motion itself. "
-                "Five times the error at five times the distance would be "
-                "the same error a frame.",
+                "Five times the error at five times the distance would be the same error a frame.",
             .figures = {{"none", [error] { return error(nullptr); }}}};
         for (const std::string quality : {"preview", "standard", "final"})
             line.figures.push_back(
@@ -278,8 +270,8 @@ void measure_time(Bench& bench, const std::string& basis, const Take* take) {
                    .peer = "final",
                    .default_setting = "standard",
                    .why_off_front =
-                       "flow at 60 Hz brings a head that turns as near in less time, but a hand that passes "
-                       "before it comes out 1 dB farther off.",
+                       "flow at 60 Hz brings a head that turns as near in less time, but a hand that passes before it "
+                       "comes out 1 dB farther off.",
                    .settings = settings,
                    .most_rounds = 7});
     const auto figures = [&](const std::string& name, const std::string& unit, const auto& figure) {
@@ -345,26 +337,20 @@ int main(int argc, char** argv) {
         {.name = "align",
          .truth =
              "The scenes of [motion_scenes.md](motion_scenes.md) through a 12-bit mosaic of 320 x 240 with the "
-             "camera's "
-             "noise, each basis at its derived exposure, developed with `--estimate clipped`; one target of each. "
-             "Truth is the scene frozen at the target's "
-             "moment, without noise. Both are relit as mosaics by a key light of a few lamps, a smooth environment and "
-             "a grazing side light; the PSNR is over all pixels that show the subject (truth under all lamps above 2 % "
-             "of its 99.9th percentile, misaligned ones included), relative to the 99.9th percentile of the relit "
-             "truth, the mean of the three in dB. Settings were tuned on spin, blink, hair and turn180; turn60, talk, "
-             "hand and still are for reporting. Times are those of the second target in a row, every fifth tracking "
-             "frame being one, of turn60 at 640 x 480 on one core, without matte frames and estimates. The first run "
-             "renders the "
-             "scenes into "
-             "out/bench/motion, which takes some twenty minutes; later ones take less than ten.",
+             "camera's noise, each basis at its derived exposure, developed with `--estimate clipped`; one target of "
+             "each. Truth is the scene frozen at the target's moment, without noise. Both are relit as mosaics by a "
+             "key light of a few lamps, a smooth environment and a grazing side light; the PSNR is over all pixels "
+             "that show the subject (truth under all lamps above 2 % of its 99.9th percentile, misaligned ones "
+             "included), relative to the 99.9th percentile of the relit truth, the mean of the three in dB. Settings "
+             "were tuned on spin, blink, hair and turn180; turn60, talk, hand and still are for reporting. Times are "
+             "those of the second target in a row, every fifth tracking frame being one, of turn60 at 640 x 480 on "
+             "one core, without matte frames and estimates. The first run renders the scenes into out/bench/motion, "
+             "which takes some twenty minutes; later ones take less than ten.",
          .advice =
              "Take `standard`; `preview` to look at takes, `final` where time does not matter. Flow gains most "
-             "where things "
-             "pass before each other, where the picture turns and where texture is fine. Where even the true flow "
-             "gains "
-             "little, the "
-             "subject is lit anew as it turns under the lamps: what changes evenly is blended from both sides, edges "
-             "of shadows and highlights are not."});
+             "where things pass before each other, where the picture turns and where texture is fine. Where even "
+             "the true flow gains little, the subject is lit anew as it turns under the lamps: what changes evenly "
+             "is blended from both sides, edges of shadows and highlights are not."});
     Takes takes(bench.full() ? "out/bench/motion" : "");
     const auto is_turn60 = [](const MovingScene& scene) { return scene.name == "turn60"; };
     for (const std::string basis : {"single", "s159"}) {
