@@ -2,15 +2,15 @@
 // SPDX-License-Identifier: MIT
 // The emulated board: runs the firmware image on an RP2040 model and connects it to a host and a virtual stage.
 import { Board } from './board_model.mjs';
-import { CanBus } from './can_bus.mjs';
-import { CanSocket } from './can_socket.mjs';
+import { CanBus } from './can/can_bus.mjs';
+import { CanSocket } from './can/can_socket.mjs';
 import { ExposureRecorder } from './exposures.mjs';
 import { ExposureSocket } from './exposure_socket.mjs';
 import { readImage } from './image.mjs';
 import { parseOptions, USAGE } from './options.mjs';
 import { Pacer } from './pacer.mjs';
 import { boardPins } from './pins.mjs';
-import { UsbSocket } from './usb_socket.mjs';
+import { UsbSocket } from './usb/usb_socket.mjs';
 import { VcdWriter } from './vcd.mjs';
 
 const TICK_HZ = 125_000_000;

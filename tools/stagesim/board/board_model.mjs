@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
-import { startsUsbBoot } from './boot_rom.mjs';
-import { CanBoard } from './can_board.mjs';
-import { buildChip, onceLogger } from './chip.mjs';
+import { startsUsbBoot } from './chip/boot_rom.mjs';
+import { CanBoard } from './can/can_board.mjs';
+import { buildChip, onceLogger } from './chip/chip.mjs';
 import { boot } from './image.mjs';
-import { hangProgram } from './processor.mjs';
-import { Cause, watchdogLegacy } from './system.mjs';
-import { UsbHost } from './usb_host.mjs';
+import { hangProgram } from './chip/processor.mjs';
+import { Cause, watchdogLegacy } from './chip/system.mjs';
+import { UsbHost } from './usb/usb_host.mjs';
 
 const WATCHDOG_SCRATCH4 = 0x4005801c;
 
@@ -34,7 +34,7 @@ export class Board {
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
-   * @param {import('./can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
+   * @param {import('./can/can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
    * @param {(cause: string) => void} options.onReset

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Faults that tests inject into the emulated board, at a tick or at a trigger.
-import { starveDma } from './dma.mjs';
-import { raiseHardFault } from './processor.mjs';
-import { Cause } from './system.mjs';
+import { starveDma } from './chip/dma.mjs';
+import { raiseHardFault } from './chip/processor.mjs';
+import { Cause } from './chip/system.mjs';
 
 /** What each fault does to a Board, with the numbers given after its name. */
 const FAULTS = {

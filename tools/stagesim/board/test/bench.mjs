@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A chip on the test bench: PIO programs go in by register writes, edges come out as [cycle, levels].
-import { buildChip } from '../chip.mjs';
-import { Cause } from '../system.mjs';
+import { buildChip } from '../chip/chip.mjs';
+import { Cause } from '../chip/system.mjs';
 
 export const PIO0 = 0x50200000;
 export const PIO1 = 0x50300000;

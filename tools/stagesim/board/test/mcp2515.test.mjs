@@ -2,9 +2,9 @@
 // The CAN controller against the tables and figures of its datasheet (DS20001801J), and the bus against CAN 2.0.
 import assert from 'node:assert/strict';
 import { beforeEach, describe, test } from 'node:test';
-import { CanBus } from '../can_bus.mjs';
-import { arbitration, decodeFrame, encodeFrame, frameBits, wireBits } from '../can_frame.mjs';
-import { Mcp2515 } from '../mcp2515.mjs';
+import { CanBus } from '../can/can_bus.mjs';
+import { arbitration, decodeFrame, encodeFrame, frameBits, wireBits } from '../can/can_frame.mjs';
+import { Mcp2515 } from '../can/mcp2515.mjs';
 import { Bench } from './bench.mjs';
 
 const frame = (id, bytes, more = {}) =>

@@ -3,11 +3,11 @@
 // are Thumb halfwords, assembled by hand.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { starveDma } from '../dma.mjs';
+import { starveDma } from '../chip/dma.mjs';
 import { parseInjection } from '../injections.mjs';
-import { hangProgram, raiseHardFault } from '../processor.mjs';
-import { Cause, watchdogLegacy } from '../system.mjs';
-import { buildChip } from '../chip.mjs';
+import { hangProgram, raiseHardFault } from '../chip/processor.mjs';
+import { Cause, watchdogLegacy } from '../chip/system.mjs';
+import { buildChip } from '../chip/chip.mjs';
 import { Bench, PIO0, wrap } from './bench.mjs';
 import { MOV, SRC, jmp, mov, pull, push, JMP } from './opcodes.mjs';
 

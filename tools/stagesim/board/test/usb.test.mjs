@@ -2,9 +2,9 @@
 // The USB controller as a program sees it, with transactions as a host would send them.
 import assert from 'node:assert/strict';
 import { beforeEach, describe, test } from 'node:test';
-import { Handshake } from '../usb_controller.mjs';
-import { UsbHost } from '../usb_host.mjs';
-import { BulkInTransfer, BulkOutTransfer, ControlTransfer, Status } from '../usb_transfer.mjs';
+import { Handshake } from '../chip/usb_controller.mjs';
+import { UsbHost } from '../usb/usb_host.mjs';
+import { BulkInTransfer, BulkOutTransfer, ControlTransfer, Status } from '../usb/usb_transfer.mjs';
 import { Bench } from './bench.mjs';
 
 const REGS = 0x50110000;

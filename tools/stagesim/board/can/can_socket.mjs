@@ -3,7 +3,7 @@
 // that never tires. Records of 16 bytes, Linux's struct can_frame.
 import { createServer } from 'node:net';
 import { decodeFrame, encodeFrame, FRAME_BYTES } from './can_frame.mjs';
-import { listenAt } from './listen.mjs';
+import { listenAt } from '../listen.mjs';
 
 const NOW_ID = 0xffffffff; // a record with the board's time instead of a frame
 const BACKLOG_BYTES = 1 << 20; // of a client that does not read: then it is cut off

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // USB transfers as the host cuts them into transactions (USB 2.0 chapters 5 and 8). No time in here: the host asks for
 // the next token and tells what came back.
-import { Handshake } from './usb_controller.mjs';
+import { Handshake } from '../chip/usb_controller.mjs';
 
 /** How a transfer ended; the numbers go over the socket (docs/architecture.md, "USB transfers over a socket"). */
 export const Status = Object.freeze({ OK: 0, STALL: -1, DISCONNECTED: -2, TIMED_OUT: -3, CANCELLED: -4, OVERFLOW: -5 });

@@ -2,7 +2,7 @@
 // The USB cable as a socket: a client that connects plugs the board in, its requests are transfers
 // (docs/architecture.md, "USB transfers over a socket").
 import { createServer } from 'node:net';
-import { listenAt } from './listen.mjs';
+import { listenAt } from '../listen.mjs';
 
 const REQUEST_MAGIC = 0x54425355; // "USBT"
 const REPLY_MAGIC = 0x52425355; // "USBR"

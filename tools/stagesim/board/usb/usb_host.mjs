@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The host's end of the USB cable: finds the device, configures it, keeps frames going and carries transfers, all in
 // board time. One transaction at a time is on the bus, as long as its bytes take at 12 Mbit/s.
-import { Handshake } from './usb_controller.mjs';
+import { Handshake } from '../chip/usb_controller.mjs';
 import { BulkInTransfer, BulkOutTransfer, ControlTransfer, Status } from './usb_transfer.mjs';
 
 const MS = 1_000_000; // ns
@@ -46,7 +46,7 @@ export class UsbHost {
 
   /**
    * @param {object} clock of the chip (createAlarm)
-   * @param {import('./usb_controller.mjs').UsbController} controller
+   * @param {import('../chip/usb_controller.mjs').UsbController} controller
    * @param {(message: string) => void} log
    */
   constructor(clock, controller, log) {
