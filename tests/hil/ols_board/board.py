@@ -17,6 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 IMAGE = pathlib.Path(os.environ.get("IMAGE", ROOT / "build/firmware/stage.elf"))
 EMULATOR = ROOT / "tools/stagesim/board/board.mjs"
 BOARD = os.environ.get("BOARD", "emulated")
+EXIT_VIOLATION = 3
 
 
 class BoardError(Exception):
@@ -28,8 +29,10 @@ class BoardError(Exception):
 class EmulatedBoard:
     """board.mjs as a child process, with its trace, its exposures and its log."""
 
-    def __init__(self, *arguments, trace=False, exposures=False, image=IMAGE, can=BOARD.startswith("can:")):
+    def __init__(self, *arguments, trace=False, exposures=False, image=IMAGE, can=BOARD.startswith("can:"),
+                 may_violate=False):
         self.can = can
+        self.may_violate = may_violate
         self.directory = tempfile.TemporaryDirectory(prefix="ols")
         self.path = pathlib.Path(self.directory.name)
         self.trace = self.path / "trace.vcd" if trace else None
@@ -89,17 +92,25 @@ class EmulatedBoard:
             while select.select([self.stage], [], [], 0)[0] and self.stage.readline():
                 pass
         _, self.log = self.process.communicate(timeout=30)
-        assert self.process.returncode == 0, self.log
-        return json.loads(self.log.strip().splitlines()[-1])
+        assert self.process.returncode in (0, EXIT_VIOLATION), self.log
+        statistics = json.loads(self.log.strip().splitlines()[-1])
+        if not self.may_violate:
+            assert statistics["violations"] == []
+        return statistics
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
-        self.directory.cleanup()
+        """Ends what still runs. Whatever a test looks at, it fails when the firmware did what a chip does not forgive."""
+        try:
+            if self.process.poll() is None:
+                self.stop()
+        finally:
+            if self.process.poll() is None:
+                self.process.kill()
+                self.process.communicate()
+            self.directory.cleanup()
 
 
 class CanBoard:

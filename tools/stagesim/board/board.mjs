@@ -10,10 +10,12 @@ import { readImage } from './image.mjs';
 import { parseOptions, USAGE } from './options.mjs';
 import { Pacer } from './pacer.mjs';
 import { boardPins } from './pins.mjs';
+import { Violations } from './chip/violations.mjs';
 import { UsbSocket } from './usb/usb_socket.mjs';
 import { VcdWriter } from './vcd.mjs';
 
 const TICK_HZ = 125_000_000;
+const EXIT_VIOLATION = 3;
 
 async function main() {
   const options = parseOptions(process.argv.slice(2));
@@ -30,7 +32,9 @@ async function main() {
     ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), pins, options.activeLow) : null;
 
   const canBus = options.can ? new CanBus(options.canBitRate) : null;
+  const violations = new Violations(log);
   const board = new Board(image, {
+    violations,
     canBus,
     pins,
     naive: options.naive,
@@ -69,9 +73,11 @@ async function main() {
   vcd?.close(board.tick);
   await stage?.end();
   if (options.stats) {
-    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0 };
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0,
+                         violations: violations.list };
     process.stderr.write(`${JSON.stringify(statistics)}\n`);
   }
+  if (violations.list.length > 0) process.exitCode = EXIT_VIOLATION;
 }
 
 function boardOf(image) {

@@ -35,6 +35,7 @@ export class Board {
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
    * @param {import('./can/can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
+   * @param {import('./chip/violations.mjs').Violations} options.violations
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
    * @param {(cause: string) => void} options.onReset
@@ -148,7 +149,8 @@ export class Board {
       this.#parts.lockstep.stop();
     };
     const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
-    this.#parts = buildChip({ naive: this.#options.naive, start, logger: this.#logger });
+    const { naive, violations } = this.#options;
+    this.#parts = buildChip({ naive, start, logger: this.#logger, violations });
     this.#parts.pads.onChange = (cycle, levels, driven) => {
       this.#can?.pinsChanged(levels, driven);
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);

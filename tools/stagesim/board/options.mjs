@@ -28,8 +28,10 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
                       or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
                       suspend and busreset of USB; estop, overtemperature, openlamp pull that input low, release
                       lets all go high; genlock and genlockfall are edges of that input
-  --stats             print ticks, speed and dropped lines as JSON at the end
+  --stats             print ticks, speed, dropped lines and violations as JSON at the end
   --help
+
+exit codes: 0; 1 an error; 3 the program did what a chip does not forgive ("violation: " on stderr)
 
 example: node board.mjs --image build/firmware/stage.elf --usb /run/user/1000/board.sock --vcd trace.vcd
 `;

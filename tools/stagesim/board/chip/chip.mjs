@@ -17,13 +17,14 @@ const USB_PAGE = 0x50110;
 /**
  * Cycles are those of clk_sys and count from the reset; one is 8 ns from the first on, as if the program found its
  * 125 MHz already running. Both cores' flash and SRAM answer without wait states, and there is one core.
- * @param {{naive?: boolean, start: object, logger: object}} options `start` as correctSystem takes it, and the flash
- *   chip's `uniqueId`
+ * @param {{naive?: boolean, start: object, logger: object, violations: import('./violations.mjs').Violations}} options `start` as correctSystem takes it, and the flash
+ *   chip's `uniqueId`; `violations` is told what a chip would not forgive
  */
-export function buildChip({ naive = false, start, logger }) {
+export function buildChip({ naive = false, start, logger, violations }) {
   const time = { cycle: 0 };
   const chip = new RP2040();
   chip.logger = logger;
+  chip.violations = violations;
   const pads = new Pads(time);
   chip.pio = PIO_PAGES.map((page, index) => {
     chip.peripherals[page] = new Pio(chip, { index, pads, time, naive });

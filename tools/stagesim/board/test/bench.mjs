@@ -2,6 +2,7 @@
 // A chip on the test bench: PIO programs go in by register writes, edges come out as [cycle, levels].
 import { buildChip } from '../chip/chip.mjs';
 import { Cause } from '../chip/system.mjs';
+import { Violations } from '../chip/violations.mjs';
 
 export const PIO0 = 0x50200000;
 export const PIO1 = 0x50300000;
@@ -13,7 +14,8 @@ export class Bench {
     const logger = { debug() {}, info() {}, warn() {}, error(name, text) { throw new Error(`${name}: ${text}`); } };
     const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, onWatchdog: () => {},
                     uniqueId: new Uint8Array(8) };
-    Object.assign(this, buildChip({ naive, start, logger }));
+    this.violations = new Violations(() => {});
+    Object.assign(this, buildChip({ naive, start, logger, violations: this.violations }));
     this.edges = [];
     this.pads.onChange = (cycle, levels) => this.edges.push([cycle, levels]);
     this.processor([BRANCH_TO_SELF]);
