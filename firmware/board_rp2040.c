@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Board: clocks, pins, time, sleep and watchdog of an RP2040 with a 12 MHz crystal (Raspberry Pi Pico and kin).
+// Board: pins, time, sleep and watchdog of an RP2040 (Raspberry Pi Pico and kin).
 #include "board_rp2040.h"
 
 #include "board.h"
@@ -14,46 +14,6 @@ enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
 
 static volatile bool woken;
 static bool reset_by_watchdog;
-
-void board_release_reset(uint32_t blocks) {
-    REGISTER_SET(RESETS_RESET) = blocks;  // known state, also after a jump from a debugger
-    REGISTER_CLEAR(RESETS_RESET) = blocks;
-    while (~RESETS_RESET_DONE & blocks) {
-    }
-}
-
-// 12 MHz x feedback / (first x second), datasheet 2.18.2.
-static void start_pll(uint32_t base, uint32_t feedback, uint32_t first, uint32_t second) {
-    PLL_CS(base) = 1;  // reference divider
-    PLL_FBDIV(base) = feedback;
-    REGISTER_CLEAR(PLL_PWR(base)) = PLL_PWR_PD | PLL_PWR_VCOPD;
-    while (!(PLL_CS(base) & PLL_CS_LOCK)) {
-    }
-    PLL_PRIM(base) = first << 16 | second << 12;
-    REGISTER_CLEAR(PLL_PWR(base)) = PLL_PWR_POSTDIVPD;
-}
-
-static void init_clocks(void) {
-    XOSC_STARTUP = XOSC_STARTUP_1MS;
-    XOSC_CTRL = XOSC_1_15MHZ | XOSC_ENABLE;
-    while (!(XOSC_STATUS & XOSC_STABLE)) {
-    }
-    // Off the PLLs before they are touched: a watchdog reset leaves the clocks as they were (2.15.3.2).
-    REGISTER_CLEAR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
-    while (!(CLK_SYS_SELECTED & 1)) {
-    }
-    CLK_REF_CTRL = CLK_REF_SRC_XOSC;
-    while (!(CLK_REF_SELECTED & 1 << CLK_REF_SRC_XOSC)) {
-    }
-    board_release_reset(RESET_PLL_SYS | RESET_PLL_USB);
-    start_pll(PLL_SYS_BASE, 125, 6, 2);  // 1500 MHz / 12 = 125 MHz
-    start_pll(PLL_USB_BASE, 100, 5, 5);  // 1200 MHz / 25 = 48 MHz
-    REGISTER_SET(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
-    while (!(CLK_SYS_SELECTED & 1 << CLK_SYS_SRC_AUX)) {
-    }
-    CLK_USB_CTRL = CLK_ENABLE;
-    WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | 12;  // 12 MHz / 12: microseconds for timer and watchdog (4.7.2)
-}
 
 static const uint8_t output_pins[] = BOARD_OUTPUT_PINS;
 enum { OUTPUT_PINS = sizeof output_pins };
@@ -102,17 +62,14 @@ static void init_pins(void) {
 }
 
 void board_init(void) {
-    board_release_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
+    reset_blocks(RESET_IO_BANK0 | RESET_PADS_BANK0);
     init_pins();
-    init_clocks();
-    board_release_reset(RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
+    reset_blocks(RESET_BUSCTRL | RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
     BUSCTRL_BUS_PRIORITY = BUS_PRIORITY_DMA;  // the processor waits rather than a FIFO
     TIMER_INTE = 1u << BOARD_ALARM_TICK | 1u << BOARD_ALARM_HEARTBEAT | 1u << BOARD_ALARM_TRIGGER;
     reset_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH(3) == RUNNING_MAGIC;
     WATCHDOG_SCRATCH(3) = RUNNING_MAGIC;
-    PSM_WDSEL = PSM_ALL_BUT_OSCILLATORS;
     board_feed_watchdog();
-    WATCHDOG_CTRL = WATCHDOG_ENABLE;
 }
 
 uint32_t board_stop_inputs(void) {
@@ -172,7 +129,7 @@ void board_sleep(void) {
 }
 
 void board_feed_watchdog(void) {
-    WATCHDOG_LOAD = 2 * WATCHDOG_US;  // counts down twice a microsecond (erratum RP2040-E1)
+    WATCHDOG_LOAD = WATCHDOG_COUNTS_A_US * WATCHDOG_US;
 }
 
 bool board_was_reset_by_watchdog(void) {

@@ -11,9 +11,6 @@ enum { BOARD_ALARM_TICK = 0, BOARD_ALARM_HEARTBEAT = 1, BOARD_ALARM_TRIGGER = 2 
 // From a handler: the main loop has something to look at. board_sleep returns at once.
 void board_wake(void);
 
-// Holds and then releases the reset of peripherals (RESET_ bits).
-void board_release_reset(uint32_t blocks);
-
 // mcp2515.c: from now on IRQ_CAN comes when the controller wants something, or when it is raised.
 void board_watch_can_interrupt(void);
 void board_raise_can_interrupt(void);

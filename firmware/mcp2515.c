@@ -249,7 +249,7 @@ static void release_pins(void) {
 
 static void init_spi(void) {
     CLK_PERI_CTRL = CLK_ENABLE;  // from clk_sys
-    board_release_reset(BOARD_CAN_SPI ? RESET_SPI1 : RESET_SPI0);
+    reset_blocks(BOARD_CAN_SPI ? RESET_SPI1 : RESET_SPI0);
     SPI_CPSR(BOARD_CAN_SPI) = SPI_PRESCALE;
     SPI_CR0(BOARD_CAN_SPI) = (SPI_DIVIDER - 1) << 8 | SPI_MODE_1_1 | SPI_8_BITS;
     SPI_CR1(BOARD_CAN_SPI) = SPI_ENABLE;

@@ -14,6 +14,7 @@
 #define RESETS_RESET 0x4000c000
 #define RESETS_RESET_DONE REGISTER(0x4000c008)
 enum {
+    RESET_BUSCTRL = 1 << 1,
     RESET_DMA = 1 << 2,
     RESET_IO_BANK0 = 1 << 5,
     RESET_PADS_BANK0 = 1 << 8,
@@ -26,6 +27,14 @@ enum {
     RESET_TIMER = 1 << 21,
     RESET_USBCTRL = 1 << 24
 };
+
+// Resets blocks (RESET_ bits) and waits until they answer: known state, also after a jump from a debugger.
+static inline __attribute__((always_inline)) void reset_blocks(uint32_t blocks) {
+    REGISTER_SET(RESETS_RESET) = blocks;
+    REGISTER_CLEAR(RESETS_RESET) = blocks;
+    while (~RESETS_RESET_DONE & blocks) {
+    }
+}
 
 // Boot ROM: functions by two letters, found with a function of its own (2.8.3)
 #define ROM_FUNCTION_TABLE (*(volatile uint16_t*)0x14)
@@ -42,7 +51,8 @@ enum { PSM_ALL_BUT_OSCILLATORS = 0x1fffc };
 #define XOSC_CTRL REGISTER(0x40024000)
 #define XOSC_STATUS REGISTER(0x40024004)
 #define XOSC_STARTUP REGISTER(0x4002400c)
-enum { XOSC_1_15MHZ = 0xaa0, XOSC_ENABLE = 0xfab << 12, XOSC_STARTUP_1MS = 47 };
+// STARTUP counts 256 periods of 12 MHz a step, 14 bits of them. A Pico's crystal takes some 6 ms, others several times that.
+enum { XOSC_1_15MHZ = 0xaa0, XOSC_ENABLE = 0xfab << 12, XOSC_STARTUP_64MS = 64 * 47 };
 #define XOSC_STABLE (1u << 31)
 
 // Ring oscillator: a random bit (2.17.8)
@@ -77,7 +87,7 @@ enum {
 #define WATCHDOG_REASON REGISTER(0x40058008)
 #define WATCHDOG_SCRATCH(n) REGISTER(0x4005800c + 4 * (n))
 #define WATCHDOG_TICK REGISTER(0x4005802c)
-enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9 };
+enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9, WATCHDOG_COUNTS_A_US = 2 };  // erratum RP2040-E1
 #define WATCHDOG_TRIGGER (1u << 31)
 
 // Timer, microseconds (4.6.5)

@@ -3,6 +3,7 @@
 #include <stdint.h>
 
 #include "board_rp2040.h"
+#include "clocks.h"
 #include "fault.h"
 #include "interrupts.h"
 #include "rp2040.h"
@@ -17,8 +18,9 @@ typedef union {
     void (*handler)(void);
 } vector;
 
-// Runs in flash: nothing of the image is in SRAM yet, so no call may leave this function before the copy.
+// Runs in flash: nothing of the image is in SRAM yet, so no call may leave flash before the copy.
 __attribute__((section(".reset"), noreturn)) static void reset(void) {
+    clocks_start();
     const volatile uint32_t* from = ram_image_in_flash;
     for (volatile uint32_t* to = ram_image_begin; to < ram_image_end;) *to++ = *from++;
     for (volatile uint32_t* to = bss_begin; to < bss_end;) *to++ = 0;

@@ -16,6 +16,7 @@ import { VcdWriter } from './vcd.mjs';
 
 const TICK_HZ = 125_000_000;
 const EXIT_VIOLATION = 3;
+const PARENT_MS = 500;
 
 async function main() {
   const options = parseOptions(process.argv.slice(2));
@@ -24,7 +25,7 @@ async function main() {
     return;
   }
   const log = (text) => process.stderr.write(`board: ${text}\n`);
-  const image = readImage(options.image);
+  const image = readImage(options.image, options['flash-as-is']);
   const pins = boardPins(options.board ?? boardOf(image));
   const vcd = options.vcd ? new VcdWriter(options.vcd, pins) : null;
   const stage = options.exposures ? await ExposureSocket.open(options.exposures, options.pace === 'wall') : null;
@@ -40,6 +41,8 @@ async function main() {
     naive: options.naive,
     seed: options.seed,
     uniqueId: options.boardId,
+    roscHz: options.roscHz,
+    crystal_ms: options.crystal_ms,
     injections: options.inject,
     log,
     onEdge: (tick, levels) => {
@@ -66,6 +69,10 @@ async function main() {
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });
   for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => pacer.stop());
+  whenOrphaned(() => {
+    log('whoever started this board has gone: ending');
+    pacer.stop();
+  });
   await pacer.run();
 
   usb?.close();
@@ -73,11 +80,22 @@ async function main() {
   vcd?.close(board.tick);
   await stage?.end();
   if (options.stats) {
-    const statistics = { ...pacer.statistics, ...board.handlerTimes, dropped: stage?.dropped ?? 0,
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, boot: board.boot, dropped: stage?.dropped ?? 0,
                          violations: violations.list };
     process.stderr.write(`${JSON.stringify(statistics)}\n`);
   }
   if (violations.list.length > 0) process.exitCode = EXIT_VIOLATION;
+}
+
+/** Calls once the process that started this one has ended, however it did. */
+function whenOrphaned(call) {
+  const parent = process.ppid;
+  const look = setInterval(() => {
+    if (process.ppid === parent) return;
+    clearInterval(look);
+    call();
+  }, PARENT_MS);
+  look.unref();
 }
 
 function boardOf(image) {

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: MIT
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
-import { startsUsbBoot } from './chip/boot_rom.mjs';
 import { CanBoard } from './can/can_board.mjs';
 import { buildChip, onceLogger } from './chip/chip.mjs';
-import { boot } from './image.mjs';
-import { hangProgram } from './chip/processor.mjs';
+import { FlashChip } from './chip/flash_chip.mjs';
+import { hangProgram, lockUp } from './chip/processor.mjs';
 import { Cause, watchdogLegacy } from './chip/system.mjs';
 import { UsbHost } from './usb/usb_host.mjs';
 
-const WATCHDOG_SCRATCH4 = 0x4005801c;
+const TICKS_PER_US = 125;
 
 export class Board {
-  #image;
+  #flash;
   #options;
   #logger;
   #epoch = 0; // tick of the chip's cycle 0
@@ -25,6 +24,7 @@ export class Board {
   #resetCause = null; // of a reset that is due
   #can = null;
   #inputs; // levels from outside, by GPIO
+  #boot; // ticks since the last reset at which what was reached first, and why it began
 
   /**
    * @param {object} image from readImage
@@ -33,6 +33,8 @@ export class Board {
    * @param {boolean} options.naive
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
+   * @param {number} options.roscHz of the ring oscillator, from which it boots
+   * @param {number} options.crystal_ms that the crystal takes to swing
    * @param {object[]} options.injections from parseInjection
    * @param {import('./can/can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
    * @param {import('./chip/violations.mjs').Violations} options.violations
@@ -42,7 +44,7 @@ export class Board {
    * @param {() => void} options.onUnplug by a fault
    */
   constructor(image, options) {
-    this.#image = image;
+    this.#flash = new FlashChip(image.flash, options.uniqueId);
     this.#options = options;
     this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
@@ -53,7 +55,7 @@ export class Board {
       const drive = (gpio, level) => this.drive(gpio, level);
       this.#can = new CanBoard(options.canBus, options.pins.can, { drive, log: (text) => this.#logger.warn('board', text) });
     }
-    this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8) });
+    this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8), crystalTicks: 0 });
   }
 
   get pins() {
@@ -84,6 +86,15 @@ export class Board {
     return { handlers: Object.fromEntries(handlers), held: longestHeld };
   }
 
+  /**
+   * Of the last boot, in microseconds after the reset: `driven`, from when on the firmware drives every output, and
+   * `attached`, when it appeared on USB; null for what has not come.
+   */
+  get boot() {
+    const us = (cycle) => (cycle === null ? null : Math.round(cycle / TICKS_PER_US));
+    return { cause: this.#boot.cause, boots: this.#boots, driven_us: us(this.#boot.driven), attached_us: us(this.#boot.attached) };
+  }
+
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
   get quiet() {
     return this.#parts.lockstep.quiet && !this.usbHost.active && !this.#can?.bus.busy;
@@ -100,6 +111,7 @@ export class Board {
       const faults = this.#injections.map(({ tick }) => tick);
       const until = Math.min(end, ...faults) - this.#epoch;
       this.#parts.lockstep.run(until);
+      if (this.#boot.attached === null && this.chip.usbCtrl.attached) this.#boot.attached = this.cycle;
       if (this.#resetCause !== null) this.reset(this.#resetCause);
     }
   }
@@ -107,7 +119,7 @@ export class Board {
   /** Starts the chip anew. What the watchdog keeps is kept if it was the cause, or lost with the power. */
   reset(cause) {
     const kept = watchdogLegacy(this.chip);
-    if (cause === Cause.RUN_PIN) kept.reason = 0;
+    if (cause === Cause.RUN_PIN) Object.assign(kept, { reason: 0, scratch: new Uint32Array(8), crystalTicks: 0 }); // 4.7.1
     if (cause === Cause.WATCHDOG && kept.reason === 0) kept.reason = 1; // TIMER
     this.#resetCause = null;
     this.#options.log(`reset at tick ${this.tick}: ${cause}`);
@@ -127,8 +139,7 @@ export class Board {
 
   /** The processor stops for good, in a handler that never ends; the rest of the chip goes on. */
   lockUp() {
-    hangProgram(this.chip);
-    this.chip.core.PM = true;
+    lockUp(this.chip);
   }
 
   /** Drives an input of the board from outside, until it is driven otherwise. */
@@ -142,30 +153,26 @@ export class Board {
     this.#options.onUnplug();
   }
 
-  #start(cause, { reason, scratch }) {
+  #start(cause, kept) {
     const seed = this.#options.seed * 0x10000 + this.#boots++;
     const onWatchdog = () => {
       this.#resetCause = Cause.WATCHDOG;
       this.#parts.lockstep.stop();
     };
-    const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
-    const { naive, violations } = this.#options;
-    this.#parts = buildChip({ naive, start, logger: this.#logger, violations });
+    const onLoader = (why) =>
+      this.#options.log(`in the USB boot loader, which is not emulated, ${why}; a reset starts the boot ROM again`);
+    const start = { cause, ...kept, seed, onWatchdog, onLoader };
+    const { naive, violations, roscHz, crystal_ms } = this.#options;
+    this.#parts = buildChip({ naive, start, flash: this.#flash, roscHz, crystal_ms, logger: this.#logger, violations });
     this.#parts.pads.onChange = (cycle, levels, driven) => {
       this.#can?.pinsChanged(levels, driven);
+      if (this.#boot.driven === null && (driven & this.pins.mask) === this.pins.mask) this.#boot.driven = cycle;
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     };
+    this.#boot = { cause, driven: null, attached: null };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
-    if (startsUsbBoot(scratch)) {
-      // Cleared by the boot ROM as it jumps. The loader's own USB device is not modelled: nobody answers.
-      this.chip.writeUint32(WATCHDOG_SCRATCH4, 0);
-      this.hang();
-      this.#options.log('in the USB boot loader, which is not emulated; a reset starts the image again');
-      return;
-    }
-    boot(this.chip, this.#image);
   }
 
   #edge(tick, levels) {

@@ -3,9 +3,10 @@
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
 import { basename } from 'node:path';
+import { isBoot2 } from './chip/boot_rom.mjs';
 
 const FLASH_START = 0x10000000;
-const FLASH_END = 0x11000000;
+const FLASH_BYTES = 2 << 20; // of a Pico's chip
 const BOOT2_BYTES = 256;
 const LABEL_ADDRESS = 0x10000108; // protocol/image_label.h
 const LABEL_BYTES = 56;
@@ -16,10 +17,11 @@ const UF2_FAMILY_RP2040 = 0xe48bff56;
 /** @typedef {{address: number, bytes: Uint8Array}} Piece of flash */
 
 /**
- * @returns {{name: string, pieces: Piece[], label: {board: string, version: string} | null}} with every byte in flash and a boot2 the boot ROM would accept
+ * @param {boolean} asIs takes an image that the boot ROM would not start
+ * @returns {{name: string, flash: Uint8Array, label: {board: string, version: string} | null}}
  * @throws {Error} naming the file and what is wrong with it
  */
-export function readImage(path) {
+export function readImage(path, asIs = false) {
   let bytes;
   try {
     bytes = readFileSync(path);
@@ -29,34 +31,29 @@ export function readImage(path) {
   const isElf = bytes.subarray(0, 4).equals(Buffer.from('\x7fELF', 'latin1'));
   const pieces = isElf ? readElf(path, bytes) : readUf2(path, bytes);
   for (const { address, bytes: content } of pieces) {
-    if (address < FLASH_START || address + content.length > FLASH_END) {
-      throw new Error(`${path}: ${hex(address)} is not in flash; link the image with load addresses in flash`);
+    if (address < FLASH_START || address + content.length > FLASH_START + FLASH_BYTES) {
+      throw new Error(`${path}: ${hex(address)} is not in flash; link the image with load addresses in its 2 MB`);
     }
   }
-  checkBoot2(path, pieces);
+  const flash = flashOf(pieces);
+  if (!asIs) checkBoot2(path, flash);
   const digest = createHash('sha256').update(bytes).digest('hex').slice(0, 12);
-  return { name: `${basename(path)} ${digest}`, pieces, label: readLabel(pieces) };
+  return { name: `${basename(path)} ${digest}`, flash, label: readLabel(flash) };
 }
 
 /** What the image says of itself (protocol/image_label.h); null without a label. */
-function readLabel(pieces) {
-  const label = Buffer.alloc(LABEL_BYTES);
-  for (const { address, bytes } of pieces) {
-    const at = address - LABEL_ADDRESS; // of the piece in the label
-    if (at < LABEL_BYTES) label.set(bytes.subarray(Math.max(0, -at), Math.max(0, LABEL_BYTES - at)), Math.max(0, at));
-  }
+function readLabel(flash) {
+  const label = Buffer.from(flash.buffer, LABEL_ADDRESS - FLASH_START, LABEL_BYTES);
   if (label.readUInt32LE(0) !== LABEL_MAGIC) return null;
   const text = (from, bytes) => label.toString('latin1', from, from + bytes).replace(/\0.*$/s, '');
   return { board: text(16, 16), version: text(32, 24) };
 }
 
-/** Copies the image into the chip's flash, and starts the core as boot2 does (RP2040 datasheet 2.8.1). */
-export function boot(chip, image) {
-  for (const { address, bytes } of image.pieces) chip.flash.set(bytes, address - FLASH_START);
-  // The boot ROM and boot2 are not run: boot2 leaves flash readable, VTOR behind itself, and SP and PC from there.
-  const vectors = FLASH_START + BOOT2_BYTES;
-  chip.core.VTOR = vectors;
-  chip.core.reset();
+/** The whole of flash, all ones where the image has nothing. */
+function flashOf(pieces) {
+  const flash = new Uint8Array(FLASH_BYTES).fill(0xff);
+  for (const { address, bytes } of pieces) flash.set(bytes, address - FLASH_START);
+  return flash;
 }
 
 /** Program headers with bytes in the file, by physical (load) address (ELF specification, "Program Header"). */
@@ -104,27 +101,10 @@ function readUf2(path, bytes) {
 }
 
 /** The boot ROM starts no image whose first 252 bytes do not have the CRC in the next four (datasheet 2.8.1.3.1). */
-function checkBoot2(path, pieces) {
-  const boot2 = new Uint8Array(BOOT2_BYTES).fill(0xff);
-  for (const { address, bytes } of pieces) {
-    const at = address - FLASH_START;
-    if (at < BOOT2_BYTES) boot2.set(bytes.subarray(0, BOOT2_BYTES - at), at);
+function checkBoot2(path, flash) {
+  if (!isBoot2(flash.subarray(0, BOOT2_BYTES))) {
+    throw new Error(`${path}: its first ${BOOT2_BYTES} bytes, boot2, do not have their CRC; the boot ROM would refuse it`);
   }
-  const stated = new DataView(boot2.buffer).getUint32(BOOT2_BYTES - 4, true);
-  const computed = crc32Mpeg2(boot2.subarray(0, BOOT2_BYTES - 4));
-  if (stated !== computed) {
-    throw new Error(`${path}: boot2 says CRC ${hex(stated)} but has ${hex(computed)}; the boot ROM would refuse it`);
-  }
-}
-
-/** CRC-32/MPEG-2: polynomial 0x04c11db7, from all ones, not reflected, not inverted. */
-export function crc32Mpeg2(bytes) {
-  let crc = 0xffffffff;
-  for (const byte of bytes) {
-    crc ^= byte << 24;
-    for (let bit = 0; bit < 8; bit++) crc = crc & 0x80000000 ? (crc << 1) ^ 0x04c11db7 : crc << 1;
-  }
-  return crc >>> 0;
 }
 
 function hex(value) {

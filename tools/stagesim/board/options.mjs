@@ -9,6 +9,9 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
 
   --image FILE        firmware, .elf or .uf2
   --board NAME        whose pins to connect: pico or feather_can (default: the board that the image says it is for)
+  --flash-as-is       take an image that the boot ROM would not start: the board is then in its boot loader
+  --rosc-mhz F        of the ring oscillator from which it boots, 1.8 to 12 (default 6.5)
+  --crystal-ms F      that the crystal takes to swing (default 6)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
   --can SOCKET        fit a CAN controller, and listen there for nodes of its bus ("CAN frames over a socket")
   --can-kbit-s N      the bus's bit rate (default 1000)
@@ -49,7 +52,8 @@ export function parseOptions(args) {
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
-        'active-low': { type: 'string', multiple: true, default: [] }, stats: flag, help: flag,
+        'active-low': { type: 'string', multiple: true, default: [] }, stats: flag, help: flag, 'flash-as-is': flag,
+        'rosc-mhz': { ...text, default: '6.5' }, 'crystal-ms': { ...text, default: '6' },
       },
     }));
   } catch (error) {
@@ -65,6 +69,8 @@ export function parseOptions(args) {
     chainBits,
     canBitRate: 1000 * integer('--can-kbit-s', values['can-kbit-s'], 1),
     seed: integer('--seed', values.seed, 0),
+    roscHz: 1e6 * number('--rosc-mhz', values['rosc-mhz'], 1.8, 12),
+    crystal_ms: number('--crystal-ms', values['crystal-ms'], 0, 1e6),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
     activeLow: values['active-low'].map((text) => trigger(text)),
     boardId: identity(values['board-id']),
@@ -80,6 +86,12 @@ function identity(text) {
 function trigger(text) {
   if (!/^[0-3]$/.test(text)) throw new Error(`--active-low ${text}: not a trigger, 0 to 3`);
   return Number(text);
+}
+
+function number(name, text, least, most) {
+  const value = Number(text);
+  if (text.trim() === '' || !(value >= least && value <= most)) throw new Error(`${name} ${text}: not a number from ${least} to ${most}`);
+  return value;
 }
 
 function integer(name, text, least) {

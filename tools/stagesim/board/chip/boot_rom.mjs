@@ -1,6 +1,46 @@
 // SPDX-License-Identifier: MIT
-// What firmware can see of the boot ROM: the table of functions and the search in it (RP2040 datasheet 2.8.3), and the
-// one function that restarts the chip as a USB boot loader. That loader itself is not here: the board has left the bus.
+// The boot ROM: from the end of reset to boot2 in flash, as RP2040 datasheet 2.8.1 describes it, by the same bus accesses as any
+// program; and the table of functions, of which one is there: the restart into the USB loader (2.8.3). That loader itself is
+// not: the board has left the bus.
+
+const RESETS = 0x4000c000;
+const RESETS_DONE = 0x4000c008;
+const CLR = 0x3000;
+const SET = 0x2000;
+const IO_QSPI_RESET = 1 << 6;
+const PADS_BANK0_RESET = 1 << 8;
+const PADS_QSPI_RESET = 1 << 9;
+const TIMER_RESET = 1 << 21;
+const PADS_BANK0 = 0x4001c000;
+const PAD_INPUT = 1 << 6;
+const ADC_PINS = [26, 27, 28, 29];
+const IO_QSPI = 0x40018000;
+const QSPI_PINS = 6;
+const SSI = 0x18000000;
+const SSI_CTRLR0 = SSI;
+const SSI_SSIENR = SSI + 0x08;
+const SSI_SER = SSI + 0x10;
+const SSI_BAUDR = SSI + 0x14;
+const SSI_SR = SSI + 0x28;
+const SSI_RECEIVED = 1 << 3;
+const SSI_DR0 = SSI + 0x60;
+const SSI_8_BITS = 7 << 16;
+const SSI_CLOCK_MODE = 6; // place of SCPH and SCPOL
+const SS_CTRL = IO_QSPI + 0x0c;
+const SS_AUTO = 0;
+const SS_LOW = 2 << 8;
+const SS_HIGH = 3 << 8;
+const BOOT_BAUD = 6; // flash at a sixth of the ring oscillator
+const READ_DATA = 0x03;
+
+const BOOT2_BYTES = 256;
+const BOOT2_AT = 0x20041f00; // the last of SRAM5
+const ATTEMPTS = 128;
+// "Each attempt takes around 4 ms total with a 6.5 MHz boot clock", as the published boot ROM's source says: 26 000 cycles, of
+// which the transfer takes the others.
+const CRC_CYCLES = 10_000;
+const STRAP_CYCLES = 600; // the wait for the pull-up of the flash's chip select, and nine readings of it
+const POLL_CYCLES = 8;
 
 const WATCHDOG = 0x40058000;
 const CTRL = WATCHDOG;
@@ -63,7 +103,93 @@ function leaveForUsbBoot(chip) {
   chip.writeUint32(CTRL, ENABLE);
 }
 
-/** Whether a chip that starts with these scratch registers goes to the USB boot loader, not to the image in flash. */
-export function startsUsbBoot(scratch) {
-  return scratch[4] === JUMP_MAGIC && scratch[7] === (USB_BOOT | THUMB);
+/**
+ * The boot, step by step; yields how many cycles of clk_sys each step takes. Ends with the processor at boot2's first
+ * instruction, or goes on for ever where the USB loader would run.
+ * @param {import('rp2040js').RP2040} chip
+ * @param {(reason: string) => void} onLoader
+ */
+export function* bootRom(chip, onLoader) {
+  yield* release(chip, PADS_BANK0_RESET);
+  for (const pin of ADC_PINS) chip.writeUint32(PADS_BANK0 + 4 + 4 * pin + CLR, PAD_INPUT);
+  if (jumpsToLoader(chip)) {
+    onLoader('as the firmware asked');
+    yield Infinity;
+  }
+  yield* release(chip, IO_QSPI_RESET | PADS_QSPI_RESET | TIMER_RESET);
+  yield STRAP_CYCLES;
+  yield* connectFlash(chip);
+  for (let attempt = 0; attempt < ATTEMPTS; attempt++) {
+    const boot2 = yield* readBoot2(chip, attempt & 3);
+    yield CRC_CYCLES;
+    if (!isBoot2(boot2)) continue;
+    boot2.forEach((byte, n) => chip.writeUint8(BOOT2_AT + n, byte));
+    const { core } = chip;
+    core.SP = BOOT2_AT;
+    core.LR = 0; // nobody to return to
+    core.PC = BOOT2_AT;
+    core.waiting = false;
+    return;
+  }
+  onLoader(`after ${ATTEMPTS} attempts to find a boot2 with its CRC in the first ${BOOT2_BYTES} bytes of flash`);
+  yield Infinity;
+}
+
+/** Whether the scratch registers hold the jump that was left for after this reset; they are used up. */
+function jumpsToLoader(chip) {
+  const [magic, check, , entry] = [4, 5, 6, 7].map((n) => chip.readUint32(SCRATCH + 4 * n) >>> 0);
+  if (magic !== JUMP_MAGIC || check !== (entry ^ -JUMP_MAGIC) >>> 0) return false;
+  chip.writeUint32(SCRATCH + 4 * 4, 0);
+  if (entry !== (USB_BOOT | THUMB)) throw new Error('the watchdog scratch registers ask for a jump into a program: not modelled');
+  return true;
+}
+
+function* release(chip, blocks) {
+  chip.writeUint32(RESETS + CLR, blocks);
+  while ((chip.readUint32(RESETS_DONE) & blocks) !== blocks) yield POLL_CYCLES;
+}
+
+function* connectFlash(chip) {
+  chip.writeUint32(RESETS + SET, IO_QSPI_RESET | PADS_QSPI_RESET);
+  yield* release(chip, IO_QSPI_RESET | PADS_QSPI_RESET);
+  for (let n = 0; n < QSPI_PINS; n++) chip.writeUint32(IO_QSPI + 8 * n + 4, 0);
+  chip.writeUint32(SSI_SSIENR, 0);
+  chip.writeUint32(SSI_BAUDR, BOOT_BAUD);
+  chip.writeUint32(SSI_CTRLR0, SSI_8_BITS);
+  chip.writeUint32(SSI_SER, 1);
+  chip.writeUint32(SSI_SSIENR, 1);
+}
+
+function* readBoot2(chip, clockMode) {
+  chip.writeUint32(SSI_SSIENR, 0);
+  chip.writeUint32(SSI_CTRLR0, SSI_8_BITS | (clockMode << SSI_CLOCK_MODE));
+  chip.writeUint32(SSI_SSIENR, 1);
+  chip.writeUint32(SS_CTRL, SS_LOW);
+  const bytes = new Uint8Array(BOOT2_BYTES);
+  const header = [READ_DATA, 0, 0, 0];
+  for (let n = 0; n < header.length + BOOT2_BYTES; n++) {
+    chip.writeUint32(SSI_DR0, header[n] ?? 0);
+    while (!(chip.readUint32(SSI_SR) & SSI_RECEIVED)) yield POLL_CYCLES;
+    const byte = chip.readUint32(SSI_DR0);
+    if (n >= header.length) bytes[n - header.length] = byte;
+  }
+  chip.writeUint32(SS_CTRL, SS_HIGH);
+  chip.writeUint32(SS_CTRL, SS_AUTO);
+  return bytes;
+}
+
+/** The CRC in the last four of its bytes is that of the others (datasheet 2.8.1.3.1). */
+export function isBoot2(bytes) {
+  const stated = new DataView(bytes.buffer, bytes.byteOffset).getUint32(BOOT2_BYTES - 4, true);
+  return stated === crc32Mpeg2(bytes.subarray(0, BOOT2_BYTES - 4));
+}
+
+/** CRC-32/MPEG-2: polynomial 0x04c11db7, from all ones, not reflected, not inverted. */
+export function crc32Mpeg2(bytes) {
+  let crc = 0xffffffff;
+  for (const byte of bytes) {
+    crc ^= byte << 24;
+    for (let bit = 0; bit < 8; bit++) crc = crc & 0x80000000 ? (crc << 1) ^ 0x04c11db7 : crc << 1;
+  }
+  return crc >>> 0;
 }

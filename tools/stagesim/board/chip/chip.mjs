@@ -1,44 +1,100 @@
 // SPDX-License-Identifier: MIT
 // One RP2040 from a reset to the next: rp2040js with the parts that time or the program would notice put right.
 import { RP2040 } from 'rp2040js';
-import { attachBootRom } from './boot_rom.mjs';
+import { attachBootRom, bootRom } from './boot_rom.mjs';
+import { Bus } from './bus.mjs';
+import { Clocks } from './clocks.mjs';
 import { correctDma } from './dma.mjs';
-import { attachFlash } from './flash.mjs';
 import { Lockstep } from './lockstep.mjs';
+import { CrystalOscillator, Pll } from './oscillators.mjs';
 import { Pads } from './pads.mjs';
 import { Pio } from './pio.mjs';
 import { correctProcessor } from './processor.mjs';
-import { correctSystem } from './system.mjs';
+import { QspiPins } from './qspi_pins.mjs';
+import { Resets } from './resets.mjs';
+import { Ssi } from './ssi.mjs';
+import { StoredRegisters } from './stored_registers.mjs';
+import { ChipReset, correctTimer, RingOscillator } from './system.mjs';
 import { UsbController } from './usb_controller.mjs';
+import { Watchdog } from './watchdog.mjs';
+import { Xip, XipControl } from './xip.mjs';
 
-const PIO_PAGES = [0x50200, 0x50300];
-const USB_PAGE = 0x50110;
+const PAGES = { XIP_CTRL: 0x14000, XIP_SSI: 0x18000, CLOCKS: 0x40008, RESETS: 0x4000c, PSM: 0x40010, IO_QSPI: 0x40018,
+                PADS_QSPI: 0x40020, XOSC: 0x40024, PLL_SYS: 0x40028, PLL_USB: 0x4002c, BUSCTRL: 0x40030, TIMER: 0x40054,
+                WATCHDOG: 0x40058, ROSC: 0x40060, VREG_AND_CHIP_RESET: 0x40064, USBCTRL: 0x50110, PIO0: 0x50200, PIO1: 0x50300 };
+export const ROSC_HZ = 6_500_000; // 2.17.1; 1.8 to 12 MHz over chips, voltage and temperature
+export const CRYSTAL_MS = 6; // that a Pico's crystal takes to swing; others take longer
 
 /**
- * Cycles are those of clk_sys and count from the reset; one is 8 ns from the first on, as if the program found its
- * 125 MHz already running. Both cores' flash and SRAM answer without wait states, and there is one core.
- * @param {{naive?: boolean, start: object, logger: object, violations: import('./violations.mjs').Violations}} options `start` as correctSystem takes it, and the flash
- *   chip's `uniqueId`; `violations` is told what a chip would not forgive
+ * One RP2040 as it comes out of reset: its processor is about to run the boot ROM. Time is counted in ticks of 8 ns, cycles of
+ * clk_sys at 125 MHz; before clk_sys runs so fast, a cycle of the processor lasts several. There is one core.
+ * @param {object} options
+ * @param {boolean} options.naive steps every tick
+ * @param {{cause: string, reason: number, scratch: Uint32Array, crystalTicks: number, seed: number, onWatchdog: () => void,
+ *   onLoader: (reason: string) => void}} options.start why it starts, and what it finds in the registers that outlive a reset
+ * @param {import('./flash_chip.mjs').FlashChip} options.flash
+ * @param {number} options.roscHz
+ * @param {number} options.crystal_ms
+ * @param {object} options.logger of rp2040js
+ * @param {import('./violations.mjs').Violations} options.violations is told what a chip would not forgive
  */
-export function buildChip({ naive = false, start, logger, violations }) {
+export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, crystal_ms = CRYSTAL_MS, logger, violations }) {
   const time = { cycle: 0 };
   const chip = new RP2040();
   chip.logger = logger;
   chip.violations = violations;
   const pads = new Pads(time);
-  chip.pio = PIO_PAGES.map((page, index) => {
-    chip.peripherals[page] = new Pio(chip, { index, pads, time, naive });
-    return chip.peripherals[page];
-  });
-  chip.usbCtrl = new UsbController(chip);
-  chip.peripherals[USB_PAGE] = chip.usbCtrl;
+  const put = (name, peripheral) => {
+    chip.peripherals[PAGES[name]] = peripheral;
+    return peripheral;
+  };
+  chip.pio = [0, 1].map((index) => put(`PIO${index}`, new Pio(chip, { index, pads, time, naive })));
+  chip.usbCtrl = put('USBCTRL', new UsbController(chip));
+  const clocks = putClocks(chip, put, time, { roscHz, crystal_ms, start });
+  const resets = put('RESETS', new Resets(chip, time, clocks));
+  const ssi = putFlash(chip, put, time, clocks, flash);
+  const xip = new Xip(chip, ssi);
+  put('XIP_CTRL', new XipControl(chip, xip));
+  put('PSM', new StoredRegisters(chip, 'PSM'));
+  put('BUSCTRL', new StoredRegisters(chip, 'BUSCTRL', { 0x4: 1 })); // nobody contends for the bus here
+  put('VREG_AND_CHIP_RESET', new ChipReset(chip, start.cause));
+  correctTimer(chip.peripherals[PAGES.TIMER]);
   correctProcessor(chip);
   correctDma(chip);
-  correctSystem(chip, start);
-  attachFlash(chip, start.uniqueId);
   attachBootRom(chip);
   pads.attach(chip);
-  return { chip, pads, time, lockstep: new Lockstep(chip, pads, time, naive) };
+  new Bus(chip, { resets, xip });
+  const lockstep = new Lockstep(chip, pads, time, clocks, naive);
+  chip.core.waiting = true;
+  lockstep.begin(bootRom(chip, start.onLoader));
+  return { chip, pads, time, lockstep, clocks, resets };
+}
+
+function putClocks(chip, put, time, { roscHz, crystal_ms, start }) {
+  const xosc = put('XOSC', new CrystalOscillator(chip, time, crystal_ms));
+  if (start.crystalTicks > 0) xosc.keepRunning(start.crystalTicks);
+  const [pllSys, pllUsb] = ['PLL_SYS', 'PLL_USB'].map((name) => put(name, new Pll(chip, name, time, xosc)));
+  const rosc = put('ROSC', new RingOscillator(chip, start.seed, roscHz));
+  const clocks = put('CLOCKS', new Clocks(chip, { rosc, xosc, pllSys, pllUsb }));
+  const { reason, scratch, onWatchdog } = start;
+  put('WATCHDOG', new Watchdog(chip, clocks, { reason, scratch, onReset: onWatchdog }));
+  return clocks;
+}
+
+function putFlash(chip, put, time, clocks, flash) {
+  const pins = put('IO_QSPI', new QspiPins(chip, flash));
+  put('PADS_QSPI', pins.pads);
+  return put('XIP_SSI', new Ssi(chip, time, clocks, pins));
+}
+
+/** For a test bench of single parts: as after a boot, every block out of reset, clk_sys and clk_usb from their PLLs. */
+export function assumeBooted({ chip, lockstep, clocks, resets }) {
+  lockstep.begin(null);
+  chip.core.waiting = false;
+  chip.peripherals[PAGES.XOSC].keepRunning(Infinity);
+  for (const name of ['PLL_SYS', 'PLL_USB']) chip.peripherals[PAGES[name]].assumeLocked(name === 'PLL_SYS' ? [125, 6, 2] : [100, 5, 5]);
+  clocks.assumeRunning();
+  resets.assumeReleased();
 }
 
 /** rp2040js' messages, each text once: it warns of the same register at every access. */

@@ -15,23 +15,34 @@ export class Lockstep {
   #pads;
   #time;
   #naive;
+  #clocks;
+  #rom = null; // the boot ROM while it runs, in place of instructions
+  #romUntil = 0;
   #stopped = false;
 
   /**
    * @param {import('rp2040js').RP2040} chip
    * @param {import('./pads.mjs').Pads} pads
    * @param {{cycle: number}} time since the chip's reset, shared with all parts
+   * @param {import('./clocks.mjs').Clocks} clocks
    * @param {boolean} naive steps every cycle
    */
-  constructor(chip, pads, time, naive) {
+  constructor(chip, pads, time, clocks, naive) {
     this.#chip = chip;
     this.#pads = pads;
     this.#time = time;
+    this.#clocks = clocks;
     this.#naive = naive;
     /** Cycles in which the processor was not asleep. */
     this.awakeCycles = 0;
     this.handlerTimes = new HandlerTimes(chip.core, time);
     correctClock(chip.clock);
+  }
+
+  /** Lets `rom` run until its end, which leaves the processor where it is to go on. It yields cycles of clk_sys. */
+  begin(rom) {
+    this.#rom = rom;
+    this.#romUntil = this.#time.cycle;
   }
 
   /** Makes run() return at the end of this cycle. */
@@ -45,10 +56,12 @@ export class Lockstep {
     const time = this.#time;
     this.#stopped = false;
     while (time.cycle < end && !this.#stopped) {
-      if (core.waiting) {
+      if (this.#rom !== null) {
+        this.#runRom(end);
+      } else if (core.waiting || !this.#clocks.running) {
         this.#advance(end, true);
       } else {
-        const cycles = runInstruction(core);
+        const cycles = this.#clocks.ticks(runInstruction(core));
         this.awakeCycles += cycles;
         this.handlerTimes.pass(cycles);
         this.#advance(time.cycle + cycles, false);
@@ -68,6 +81,20 @@ export class Lockstep {
     return nextAlarm === null ? Infinity : Math.ceil(nextAlarm.nanos / CYCLE_NS);
   }
 
+  #runRom(end) {
+    if (this.#time.cycle >= this.#romUntil) {
+      const { value: cycles, done } = this.#rom.next();
+      if (done) {
+        this.#rom = null;
+        return;
+      }
+      this.#romUntil = this.#time.cycle + (cycles === Infinity ? Infinity : this.#clocks.ticks(cycles));
+    }
+    const until = Math.min(end, this.#romUntil);
+    if (this.#romUntil !== Infinity) this.awakeCycles += until - this.#time.cycle;
+    this.#advance(until, false);
+  }
+
   #advance(target, untilAwake) {
     const { core, clock } = this.#chip;
     const [pio0, pio1] = this.#chip.pio;
@@ -79,7 +106,7 @@ export class Lockstep {
       const next = this.#naive ? 0 : Math.min(pio0.due, pio1.due, this.nextAlarmCycle, target);
       time.cycle = Math.max(next, time.cycle + 1);
       clock.tick(time.cycle * CYCLE_NS - clock.nanosCounter);
-      if (untilAwake && !core.waiting) return;
+      if (untilAwake && !core.waiting && this.#clocks.running) return;
     }
   }
 }

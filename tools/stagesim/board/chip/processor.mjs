@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Corrections to rp2040js' Cortex-M0+ core: sleeping, waking and faulting as the ARMv6-M manual has it.
 
+import { BusFault } from './bus.mjs';
+
+const EXC_NMI = 2;
 const EXC_HARDFAULT = 3;
+const EXECUTE_NEVER = 0x40000000; // from here on (ARMv6-M B3.1)
+const EXC_RETURN = 0xf0000000;
 const ENTRY_CYCLES = 15; // Cortex-M0+ TRM 3.4.1 with zero wait states; the return takes about as long
 const RETURN_CYCLES = 13;
 
@@ -42,11 +47,27 @@ export function correctProcessor(chip) {
   chip.onBreak = () => raiseHardFault(chip);
 }
 
-/** Enters the HardFault handler at the next instruction. */
+/** Enters the HardFault handler at the next instruction; in a handler of that priority, locks up (ARMv6-M B1.5.6). */
 export function raiseHardFault(chip) {
-  chip.core.waiting = false;
-  chip.core.exceptionEntry(EXC_HARDFAULT);
-  chip.core.PC &= ~1;
+  const { core } = chip;
+  core.waiting = false;
+  if (core.IPSR === EXC_NMI || core.IPSR === EXC_HARDFAULT) {
+    lockUp(chip);
+    return;
+  }
+  try {
+    core.exceptionEntry(EXC_HARDFAULT);
+    core.PC &= ~1;
+  } catch (error) {
+    if (!(error instanceof BusFault)) throw error; // the stack, or the vector table, is not there
+    lockUp(chip);
+  }
+}
+
+/** Nothing but a reset helps. */
+export function lockUp(chip) {
+  hangProgram(chip);
+  chip.core.PM = true;
 }
 
 /** Lets the program go on at a branch to itself, which is put where no program is: the stack's far end. */
@@ -71,9 +92,23 @@ function wakePending(core) {
  */
 export function runInstruction(core) {
   const from = core.PC;
-  const cycles = core.executeInstruction() + core.extraCycles;
+  const cycles = execute(core, from) + core.extraCycles;
   core.extraCycles = 0;
   if (core.PC === from) core.waiting = true;
   if (core.waiting && wakePending(core)) core.waiting = false;
   return cycles;
+}
+
+const FAULT_CYCLES = 1;
+
+function execute(core, from) {
+  try {
+    if (from >>> 0 >= EXECUTE_NEVER && from >>> 0 < EXC_RETURN) throw new BusFault('an instruction where nothing may run');
+    return core.executeInstruction();
+  } catch (error) {
+    if (!(error instanceof BusFault)) throw error;
+    core.PC = from;
+    raiseHardFault(core.rp2040);
+    return FAULT_CYCLES;
+  }
 }

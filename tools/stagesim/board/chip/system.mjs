@@ -1,53 +1,21 @@
 // SPDX-License-Identifier: MIT
-// The small blocks around the core that rp2040js lacks or gets wrong: resets, the reset cause, the ring oscillator's
-// random bit, the timer's alarms, the watchdog as a reset.
+// The small blocks around the core that rp2040js lacks or gets wrong: the reset cause, the ring oscillator, the timer's alarms.
 import { BasePeripheral } from 'rp2040js';
 
-const RESETS = 0x4000c;
-const BUSCTRL = 0x40030;
-const TIMER = 0x40054;
 const WATCHDOG = 0x40058;
-const ROSC = 0x40060;
-const VREG_AND_CHIP_RESET = 0x40064;
+const XOSC = 0x40024;
 
 /** Why a chip starts, and what it finds in the registers that outlive the reset. */
 export const Cause = Object.freeze({ POWER: 'power', RUN_PIN: 'run pin', WATCHDOG: 'watchdog' });
 
-/**
- * @param {import('rp2040js').RP2040} chip
- * @param {{cause: string, reason: number, scratch: Uint32Array, seed: number, onWatchdog: () => void}} start
- */
-export function correctSystem(chip, start) {
-  chip.peripherals[VREG_AND_CHIP_RESET] = new ChipReset(chip, start.cause);
-  chip.peripherals[ROSC] = new RingOscillator(chip, start.seed);
-  chip.peripherals[BUSCTRL].writeUint32 = () => {}; // priorities: nobody contends for the bus here
-  correctResets(chip.peripherals[RESETS]);
-  correctTimer(chip.peripherals[TIMER]);
-
-  const watchdog = chip.peripherals[WATCHDOG];
-  watchdog.reason = start.reason;
-  watchdog.scratchData.set(start.scratch);
-  watchdog.onWatchdogTrigger = () => {
-    watchdog.timer.enable = false; // it bites once
-    watchdog.alarm.enable = false;
-    start.onWatchdog();
-  };
-}
-
-/** What a watchdog reset leaves for the next start (RP2040 datasheet 4.7.6: REASON and SCRATCH0..7). */
+/** What a watchdog reset leaves for the next start: REASON and SCRATCH0..7 (RP2040 datasheet 4.7.6), and the crystal on. */
 export function watchdogLegacy(chip) {
-  const { reason, scratchData } = chip.peripherals[WATCHDOG];
-  return { reason, scratch: scratchData.slice() };
-}
-
-/** Blocks are held in reset until the program lets them go (datasheet 2.14.3). */
-function correctResets(resets) {
-  resets.reset = 0x01ffffff;
-  Object.defineProperty(resets, 'reset_done', { get: () => ~resets.reset & 0x01ffffff, set: () => {} });
+  const { reason, scratch } = chip.peripherals[WATCHDOG];
+  return { reason, scratch: scratch.slice(), crystalTicks: Math.max(0, chip.peripherals[XOSC].runningFor) };
 }
 
 /** Stock drops the part of a microsecond that has passed, and so fires up to 1 us early. */
-function correctTimer(timer) {
+export function correctTimer(timer) {
   const ALARM0 = 0x10;
   const ALARM3 = 0x1c;
   const write = timer.writeUint32;
@@ -62,7 +30,7 @@ function correctTimer(timer) {
 }
 
 /** VREG_AND_CHIP_RESET: only CHIP_RESET's cause bits (datasheet 2.12.7), and the regulator's settings as stored. */
-class ChipReset extends BasePeripheral {
+export class ChipReset extends BasePeripheral {
   #registers = [0x000000b1, 0x00000009, 0];
 
   constructor(chip, cause) {
@@ -82,25 +50,22 @@ class ChipReset extends BasePeripheral {
   }
 }
 
-/** ROSC: settings are stored, STATUS is stable, RANDOMBIT comes from a seeded generator so that runs repeat. */
-class RingOscillator extends BasePeripheral {
-  #registers = new Map([[0x00, 0x00000aa0]]);
+/** ROSC: runs at what it comes out of reset with; RANDOMBIT comes from a seeded generator so that runs repeat. */
+export class RingOscillator extends BasePeripheral {
   #state;
 
-  constructor(chip, seed) {
+  constructor(chip, seed, hz) {
     super(chip, 'ROSC');
+    this.hz = hz;
     this.#state = (Math.imul(seed, 0x9e3779b9) ^ 0x85ebca6b) >>> 0 || 1;
   }
 
   readUint32(offset) {
     if (offset === 0x18) return 0x80001000; // STATUS: STABLE, ENABLED
-    if (offset === 0x1c) return this.#randomBit();
-    return this.#registers.get(offset) ?? 0;
+    return this.#randomBit();
   }
 
-  writeUint32(offset, value) {
-    this.#registers.set(offset, value);
-  }
+  writeUint32() {} // STATUS.BADWRITE, which is never set
 
   /** Marsaglia's xorshift32. */
   #randomBit() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A chip on the test bench: PIO programs go in by register writes, edges come out as [cycle, levels].
-import { buildChip } from '../chip/chip.mjs';
+import { assumeBooted, buildChip } from '../chip/chip.mjs';
+import { FlashChip } from '../chip/flash_chip.mjs';
 import { Cause } from '../chip/system.mjs';
 import { Violations } from '../chip/violations.mjs';
 
@@ -10,12 +11,13 @@ const SRAM = 0x20000000;
 const BRANCH_TO_SELF = 0xe7fe;
 
 export class Bench {
-  constructor({ naive = false } = {}) {
+  constructor({ naive = false, onWatchdog = () => {} } = {}) {
     const logger = { debug() {}, info() {}, warn() {}, error(name, text) { throw new Error(`${name}: ${text}`); } };
-    const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, onWatchdog: () => {},
-                    uniqueId: new Uint8Array(8) };
+    const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), crystalTicks: 0, seed: 1, onWatchdog, onLoader: () => {} };
+    const flash = new FlashChip(new Uint8Array(256), new Uint8Array(8));
     this.violations = new Violations(() => {});
-    Object.assign(this, buildChip({ naive, start, logger, violations: this.violations }));
+    Object.assign(this, buildChip({ naive, start, flash, logger, violations: this.violations }));
+    assumeBooted(this);
     this.edges = [];
     this.pads.onChange = (cycle, levels) => this.edges.push([cycle, levels]);
     this.processor([BRANCH_TO_SELF]);

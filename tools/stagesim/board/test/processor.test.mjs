@@ -6,8 +6,7 @@ import { test } from 'node:test';
 import { starveDma } from '../chip/dma.mjs';
 import { parseInjection } from '../injections.mjs';
 import { hangProgram, raiseHardFault } from '../chip/processor.mjs';
-import { Cause, watchdogLegacy } from '../chip/system.mjs';
-import { buildChip } from '../chip/chip.mjs';
+import { watchdogLegacy } from '../chip/system.mjs';
 import { Bench, PIO0, wrap } from './bench.mjs';
 import { MOV, SRC, jmp, mov, pull, push, JMP } from './opcodes.mjs';
 
@@ -144,11 +143,10 @@ test('DMA moves one word a cycle while its request is up, and restarts itself th
 
 test('the watchdog bites once, after its time in half microseconds, and leaves its reason and scratch words', () => {
   let bitten = 0;
-  const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, uniqueId: new Uint8Array(8),
-                  onWatchdog: () => bitten++ };
-  const silent = { debug() {}, info() {}, warn() {}, error() {} };
-  const { chip, lockstep, time } = buildChip({ start, logger: silent });
+  const { chip, lockstep, time } = new Bench({ onWatchdog: () => bitten++ });
   chip.core.waiting = true;
+  chip.writeUint32(0x40010008, 0x1fffc); // PSM_WDSEL: all but the oscillators
+  chip.writeUint32(0x4005802c, 1 << 9 | 12); // TICK: 12 MHz / 12
   chip.writeUint32(0x40058004, 2000); // 1 ms: counts down twice a microsecond (erratum RP2040-E1)
   chip.writeUint32(0x40058000, 1 << 30);
   chip.writeUint32(0x40058018, 0x12345678); // SCRATCH3
