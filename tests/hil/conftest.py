@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from ols_board import board
+from ols_board import board, claims
 
 KIND, _, NAME = board.BOARD.partition(":")
 IS_EMULATED = board.BOARD in ("emulated", "can:emulated")
@@ -21,6 +21,11 @@ def pytest_configure():
         raise pytest.UsageError(f"{board.EMULATOR.parent}: run `npm ci` there first")
     if shutil.which("sigrok-cli") is None:
         raise pytest.UsageError("sigrok-cli is missing: apt-get install sigrok-cli")
+
+
+def pytest_terminal_summary(terminalreporter):
+    for line in claims.summary():
+        terminalreporter.write_line(line)
 
 
 def real_board(arguments, options):

@@ -2,7 +2,7 @@
 // The board over its whole life: a chip from each reset to the next, ticks that go on across resets, the cable, and
 // faults that are due.
 import { CanBoard } from './can/can_board.mjs';
-import { buildChip, onceLogger } from './chip/chip.mjs';
+import { buildChip } from './chip/chip.mjs';
 import { FlashChip } from './chip/flash_chip.mjs';
 import { hangProgram, lockUp } from './chip/processor.mjs';
 import { Cause, watchdogLegacy } from './chip/system.mjs';
@@ -13,7 +13,6 @@ const TICKS_PER_US = 125;
 export class Board {
   #flash;
   #options;
-  #logger;
   #epoch = 0; // tick of the chip's cycle 0
   #parts;
   #levels = 0;
@@ -49,11 +48,10 @@ export class Board {
     this.#inputs = new Map(Object.values(options.pins.stopInputs).map((gpio) => [gpio, true]));
     this.#triggerMask = options.pins.triggers.reduce((mask, gpio) => mask | (1 << gpio), 0);
     this.#injections = options.injections.map((injection) => ({ ...injection }));
-    this.#logger = onceLogger(options.log);
     if (options.canBus) {
       if (options.pins.can === null) throw new Error(`board "${options.pins.name}" has no CAN controller`);
       const drive = (gpio, level) => this.drive(gpio, level);
-      this.#can = new CanBoard(options.canBus, options.pins.can, { drive, log: (text) => this.#logger.warn('board', text) });
+      this.#can = new CanBoard(options.canBus, options.pins.can, { drive, violations: options.violations });
     }
     this.#start(Cause.POWER, { reason: 0, scratch: new Uint32Array(8), crystalTicks: 0 });
   }
@@ -163,7 +161,7 @@ export class Board {
       this.#options.log(`in the USB boot loader, which is not emulated, ${why}; a reset starts the boot ROM again`);
     const start = { cause, ...kept, seed, onWatchdog, onLoader };
     const { naive, violations, roscHz, crystal_ms } = this.#options;
-    this.#parts = buildChip({ naive, start, flash: this.#flash, roscHz, crystal_ms, logger: this.#logger, violations });
+    this.#parts = buildChip({ naive, start, flash: this.#flash, roscHz, crystal_ms, violations });
     this.#parts.pads.onChange = (cycle, levels, driven) => {
       this.#can?.pinsChanged(levels, driven);
       if (this.#boot.driven === null && (driven & this.pins.mask) === this.pins.mask) this.#boot.driven = cycle;

@@ -8,20 +8,20 @@ export class CanBoard {
   #controller;
   #pins;
   #spi;
-  #log;
+  #violations;
   #drive;
   #levels = 0;
 
   /**
    * @param {import('./can_bus.mjs').CanBus} bus
    * @param {{spi: number, pins: Record<string, number>}} wiring of the board
-   * @param {{drive: (gpio: number, level: boolean) => void, log: (text: string) => void}} board
+   * @param {{drive: (gpio: number, level: boolean) => void, violations: import('../chip/violations.mjs').Violations}} board
    */
-  constructor(bus, wiring, { drive, log }) {
+  constructor(bus, wiring, { drive, violations }) {
     this.bus = bus;
     this.#pins = wiring.pins;
     this.#spi = wiring.spi;
-    this.#log = log;
+    this.#violations = violations;
     this.#drive = drive;
     this.#controller = new Mcp2515(bus);
     this.#controller.onInterrupt = (level) => drive(this.#pins.CAN_INTERRUPT, level);
@@ -37,7 +37,7 @@ export class CanBoard {
     const done = chip.clock.createAlarm(() => spi.completeTransmit(this.#controller.exchange(sent)));
     spi.onTransmit = (byte) => {
       if (spi.clockFrequency > SPI_HZ_MAX || spi.dataBits !== 8) {
-        this.#log(`can: SPI of ${spi.dataBits} bits at ${Math.round(spi.clockFrequency / 1000)} kHz: ` +
+        this.#violations.note('Microchip DS20001801J 13', `SPI of ${spi.dataBits} bits at ${Math.round(spi.clockFrequency / 1000)} kHz: ` +
           `the controller takes 8 bits at ${SPI_HZ_MAX / 1000} kHz at most`);
       }
       sent = byte;

@@ -35,13 +35,12 @@ export const CRYSTAL_MS = 6; // that a Pico's crystal takes to swing; others tak
  * @param {import('./flash_chip.mjs').FlashChip} options.flash
  * @param {number} options.roscHz
  * @param {number} options.crystal_ms
- * @param {object} options.logger of rp2040js
  * @param {import('./violations.mjs').Violations} options.violations is told what a chip would not forgive
  */
-export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, crystal_ms = CRYSTAL_MS, logger, violations }) {
+export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, crystal_ms = CRYSTAL_MS, violations }) {
   const time = { cycle: 0 };
   const chip = new RP2040();
-  chip.logger = logger;
+  chip.logger = strictLogger(violations);
   chip.violations = violations;
   const pads = new Pads(time);
   const put = (name, peripheral) => {
@@ -97,13 +96,8 @@ export function assumeBooted({ chip, lockstep, clocks, resets }) {
   resets.assumeReleased();
 }
 
-/** rp2040js' messages, each text once: it warns of the same register at every access. */
-export function onceLogger(write) {
-  const said = new Set();
-  const say = (name, message) => {
-    const text = `${name}: ${message}`;
-    if (said.size < 100 && !said.has(text)) write(text);
-    said.add(text);
-  };
-  return { debug: () => {}, info: () => {}, warn: say, error: say };
+/** What rp2040js warns of, an instruction or register that it does not have or a use that it takes for wrong, is a violation. */
+function strictLogger(violations) {
+  const note = (name, message) => violations.note('rp2040js', `${name}: ${message}`);
+  return { debug: () => {}, info: () => {}, warn: note, error: note };
 }

@@ -36,8 +36,7 @@ const BRANCH_TO_SELF = 0xe7fe;
 function cold({ flash = new Uint8Array(2 << 20).fill(0xff), onLoader = () => {}, onWatchdog = () => {}, ...options } = {}) {
   const violations = new Violations(() => {});
   const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), crystalTicks: 0, seed: 1, onWatchdog, onLoader };
-  const logger = { debug() {}, info() {}, warn() {}, error() {} };
-  const parts = buildChip({ start, flash: new FlashChip(flash, new Uint8Array(8)), logger, violations, ...options });
+  const parts = buildChip({ start, flash: new FlashChip(flash, new Uint8Array(8)), violations, ...options });
   return { ...parts, violations };
 }
 
