@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What is at each address, and what an access does there: memories, register blocks with their atomic aliases, and faults
 // (RP2040 datasheet 2.1 and 2.2; ARMv6-M A3.2.1, B3.1). Takes the place of rp2040js' decoding, which forgives.
-import { BLOCKS, NOT_MODELLED } from './registers.mjs';
+import { TICK_HZ } from './clocks.mjs';
+import { BLOCKS, FULL_CLOCK, NOT_MODELLED, TICK } from './registers.mjs';
 
 const ROM_END = 0x4000;
 const XIP = 0x10000000;
@@ -23,18 +24,21 @@ export class Bus {
   #blocks = new Map(); // by address / BLOCK_BYTES
   #resets;
   #xip;
+  #has; // by what a block may want: whether that is so now
   #violations;
 
   /**
    * Takes over the chip's accesses.
    * @param {import('rp2040js').RP2040} chip
-   * @param {{resets: import('./resets.mjs').Resets, xip: import('./xip.mjs').Xip}} parts
+   * @param {{resets: import('./resets.mjs').Resets, xip: import('./xip.mjs').Xip, clocks: import('./clocks.mjs').Clocks,
+   *   watchdog: import('./watchdog.mjs').Watchdog}} parts
    */
-  constructor(chip, { resets, xip }) {
+  constructor(chip, { resets, xip, clocks, watchdog }) {
     this.#chip = chip;
     this.#resets = resets;
     this.#xip = xip;
     this.#violations = chip.violations;
+    this.#has = { [FULL_CLOCK]: () => clocks.sysHz === TICK_HZ, [TICK]: () => watchdog.tickHz === 1e6 };
     for (const block of BLOCKS) this.#add(block);
     for (const [name, base] of Object.entries(NOT_MODELLED)) this.#add({ name, base, section: '2.2', registers: {} });
     const bytes = chip.sram;
@@ -119,6 +123,9 @@ export class Bus {
     const block = this.#blockAt(address, 'write');
     const register = this.#register(block, address, 'write');
     if (!register) return;
+    if (block.wants && !this.#has[block.wants]()) {
+      this.#violations.note(block.section, `${block.name} ${register.name} is written without ${block.wants}`);
+    }
     const alias = this.#aliasOf(block, address);
     const reserved = (value & ~register.bits) >>> 0;
     if (reserved !== 0) {

@@ -62,7 +62,7 @@ export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, cryst
   correctDma(chip);
   attachBootRom(chip);
   pads.attach(chip);
-  new Bus(chip, { resets, xip });
+  new Bus(chip, { resets, xip, clocks, watchdog: chip.peripherals[PAGES.WATCHDOG] });
   const lockstep = new Lockstep(chip, pads, time, clocks, naive);
   chip.core.waiting = true;
   lockstep.begin(bootRom(chip, start.onLoader));
@@ -93,6 +93,7 @@ export function assumeBooted({ chip, lockstep, clocks, resets }) {
   chip.peripherals[PAGES.XOSC].keepRunning(Infinity);
   for (const name of ['PLL_SYS', 'PLL_USB']) chip.peripherals[PAGES[name]].assumeLocked(name === 'PLL_SYS' ? [125, 6, 2] : [100, 5, 5]);
   clocks.assumeRunning();
+  chip.peripherals[PAGES.WATCHDOG].writeUint32(0x2c, 1 << 9 | 12); // TICK: microseconds
   resets.assumeReleased();
 }
 

@@ -34,6 +34,10 @@ const PIO = {
   ...repeated(2, 12, { 'IRQ#_INTE': [0x12c, 0xfff], 'IRQ#_INTF': [0x130, 0xfff], 'IRQ#_INTS': [0x134, NONE] }),
 };
 
+/** What a block needs for its time to be what is modelled. */
+export const FULL_CLOCK = 'clk_sys at 125 MHz';
+export const TICK = 'the watchdog\'s tick at 1 MHz';
+
 /** Writes to these are lost or change, and read as zeros, while their bit of RESETS is set; `reset` is that bit. */
 export const BLOCKS = [
   { name: 'XIP_CTRL', section: '2.6.3.6', base: 0x14000000,
@@ -73,9 +77,9 @@ export const BLOCKS = [
   { name: 'PLL_USB', section: '2.18.4', base: 0x4002c000, reset: 13, registers: PLL },
   { name: 'BUSCTRL', section: '2.1.5', base: 0x40030000, reset: 1,
     registers: { BUS_PRIORITY: [0x0, 0x1111], BUS_PRIORITY_ACK: [0x4, NONE] } },
-  { name: 'SPI0', section: '4.4.4', base: 0x4003c000, reset: 16, registers: SPI },
-  { name: 'SPI1', section: '4.4.4', base: 0x40040000, reset: 17, registers: SPI },
-  { name: 'TIMER', section: '4.6.5', base: 0x40054000, reset: 21,
+  { name: 'SPI0', section: '4.4.4', base: 0x4003c000, reset: 16, wants: FULL_CLOCK, registers: SPI },
+  { name: 'SPI1', section: '4.4.4', base: 0x40040000, reset: 17, wants: FULL_CLOCK, registers: SPI },
+  { name: 'TIMER', section: '4.6.5', base: 0x40054000, reset: 21, wants: TICK,
     registers: { TIMEHR: [0x8, NONE], TIMELR: [0xc, NONE], ...repeated(4, 4, { 'ALARM#': [0x10, ALL] }), ARMED: [0x20, 0xf],
                  TIMERAWH: [0x24, NONE], TIMERAWL: [0x28, NONE], INTR: [0x34, 0xf], INTE: [0x38, 0xf], INTF: [0x3c, 0xf],
                  INTS: [0x40, NONE] } },
@@ -85,7 +89,7 @@ export const BLOCKS = [
   { name: 'ROSC', section: '2.17.8', base: 0x40060000, registers: { STATUS: [0x18, 0x01000000], RANDOMBIT: [0x1c, NONE] } },
   { name: 'VREG_AND_CHIP_RESET', section: '2.12.7', base: 0x40064000,
     registers: { VREG: [0x0, 0xf3], BOD: [0x4, 0xf1], CHIP_RESET: [0x8, 0x01000000] } },
-  { name: 'DMA', section: '2.5.7', base: 0x50000000, reset: 2,
+  { name: 'DMA', section: '2.5.7', base: 0x50000000, reset: 2, wants: FULL_CLOCK,
     registers: { ...repeated(12, 0x40, {
       'CH#_READ_ADDR': [0x00, ALL], 'CH#_WRITE_ADDR': [0x04, ALL], 'CH#_TRANS_COUNT': [0x08, ALL],
       'CH#_CTRL_TRIG': [0x0c, DMA_CTRL], 'CH#_AL1_CTRL': [0x10, DMA_CTRL], 'CH#_AL1_READ_ADDR': [0x14, ALL],
@@ -99,15 +103,15 @@ export const BLOCKS = [
                  MULTI_CHAN_TRIGGER: [0x430, 0xffff], CHAN_ABORT: [0x444, 0xffff], N_CHANNELS: [0x448, NONE],
                  ...repeated(12, 0x40, { 'CH#_DBG_CTDREQ': [0x800, 0x3f], 'CH#_DBG_TCR': [0x804, NONE] }) } },
   // Of SIE_STATUS, writing CONNECTED and SUSPENDED clears the interrupts that their changes have raised.
-  { name: 'USBCTRL', section: '4.1.4', base: 0x50110000, reset: 24,
+  { name: 'USBCTRL', section: '4.1.4', base: 0x50110000, reset: 24, wants: FULL_CLOCK,
     registers: { ADDR_ENDP: [0x0, 0x000f007f], MAIN_CTRL: [0x40, 0x80000003], SOF_RD: [0x48, NONE], SIE_CTRL: [0x4c, 0xff07bf5f],
                  SIE_STATUS: [0x50, 0xff0f0810], BUFF_STATUS: [0x58, ALL], BUFF_CPU_SHOULD_HANDLE: [0x5c, NONE],
                  EP_ABORT: [0x60, ALL], EP_ABORT_DONE: [0x64, ALL], EP_STALL_ARM: [0x68, 0x3], NAK_POLL: [0x6c, 0x03ff03ff],
                  EP_STATUS_STALL_NAK: [0x70, ALL], USB_MUXING: [0x74, 0xf], USB_PWR: [0x78, 0x3f],
                  USBPHY_DIRECT: [0x7c, 0xff77], USBPHY_DIRECT_OVERRIDE: [0x80, 0x9fff], INTR: [0x8c, NONE], INTE: [0x90, 0xfffff],
                  INTF: [0x94, 0xfffff], INTS: [0x98, NONE] } },
-  { name: 'PIO0', section: '3.7', base: 0x50200000, reset: 10, registers: PIO },
-  { name: 'PIO1', section: '3.7', base: 0x50300000, reset: 11, registers: PIO },
+  { name: 'PIO0', section: '3.7', base: 0x50200000, reset: 10, wants: FULL_CLOCK, registers: PIO },
+  { name: 'PIO1', section: '3.7', base: 0x50300000, reset: 11, wants: FULL_CLOCK, registers: PIO },
   { name: 'SIO', section: '2.3.1.7', base: 0xd0000000, noAliases: true,
     registers: { CPUID: [0x0, NONE], GPIO_IN: [0x4, NONE], GPIO_HI_IN: [0x8, NONE],
                  GPIO_OUT: [0x10, PINS], GPIO_OUT_SET: [0x14, PINS], GPIO_OUT_CLR: [0x18, PINS], GPIO_OUT_XOR: [0x1c, PINS],

@@ -118,6 +118,16 @@ describe('bus (2.1, 2.2; ARMv6-M A3.2.1)', () => {
   });
 });
 
+test('blocks whose time would be another one are not used before clk_sys has its 125 MHz and the timer its tick', () => {
+  const { write, wait, violations } = afterRom();
+  write(RESETS + CLR, (1 << 21) | (1 << 10));
+  wait(1);
+  write(0x50200000, 1);
+  says(violations, /3\.7: PIO0 CTRL is written without clk_sys at 125 MHz/);
+  write(0x40054010, 1000);
+  says(violations, /4\.6\.5: TIMER ALARM0 is written without the watchdog's tick at 1 MHz/);
+});
+
 describe('resets (2.14)', () => {
   test('a block that is held in reset loses what is written and reads as zeros', () => {
     const { write, read, violations } = afterRom();
