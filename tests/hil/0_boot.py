@@ -10,7 +10,7 @@ import time
 import pytest
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import BOARD, IMAGE, ROOT, EmulatedBoard
 
 pytestmark = pytest.mark.skipif(BOARD != "emulated", reason="needs the emulated board: nobody sees a real one boot")
@@ -43,8 +43,8 @@ def booted(emulated, *arguments, can=False, **options):
 def test_power_on_leads_through_rom_boot2_and_clocks_to_the_first_answer_in_the_dark(emulated, name, rosc_mhz):
     board, statistics = booted(emulated, "--rosc-mhz", str(rosc_mhz), image=image_of(name))
     boot = statistics["boot"]
-    print(f"{name}, ring oscillator {rosc_mhz} MHz: outputs driven after {boot['driven_us'] / 1000:.1f} ms, "
-          f"on USB after {boot['attached_us'] / 1000:.1f} ms")
+    claims.counted(f"boot of {name}, ring oscillator {rosc_mhz} MHz: outputs driven after {boot['driven_us'] / 1000:.1f} ms, "
+                   f"on USB after {boot['attached_us'] / 1000:.1f} ms")
     # Three parts: the ROM (some 28 000 cycles) and boot2 from the ring oscillator, the crystal's 64 ms, the copy.
     assert 64_000 < boot["driven_us"] < 64_000 + 40_000 / rosc_mhz + 25_000
     assert boot["driven_us"] <= boot["attached_us"] < boot["driven_us"] + 2_000
@@ -68,7 +68,7 @@ def test_a_watchdog_reset_boots_without_waiting_for_the_crystal_again(emulated):
     assert wire.FAULTS[link.status()["fault"]] == "watchdog"
     boot = board.stop()["boot"]
     assert boot["cause"] == "watchdog" and boot["driven_us"] < 30_000
-    print(f"after a watchdog reset: outputs driven after {boot['driven_us'] / 1000:.1f} ms")
+    claims.counted(f"boot after a watchdog reset: outputs driven after {boot['driven_us'] / 1000:.1f} ms")
 
 
 def run_until(emulated, seconds, *arguments, **options):

@@ -4,7 +4,7 @@ import random
 import re
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.program import paper_program
 
 MS = 125_000  # ticks
@@ -51,6 +51,7 @@ def test_play_begins_the_stated_ticks_after_the_edge_every_time_and_the_log_coun
     rises = edges(board, "genlock")
     assert len(begins) == len(rises) == starts
     assert {begin - rise for begin, rise in zip(begins, rises)} == {latency}
+    claims.measured(f"genlock: the first event {latency} ticks after the pad's rise, {starts} times")
     # The trigger rises a latch after the begin; the witness's own delay is a few ticks more, and the same each time.
     assert max(first_rises) - min(first_rises) <= 2
     assert abs(first_rises[0] - (latency + LATCH_TICKS)) <= 4

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import ROOT, BoardError
 from ols_board.log import TriggerStream
 from ols_board.program import CHAIN_BITS
@@ -40,7 +40,7 @@ def test_at_20000_slots_a_second_the_host_sees_every_trigger_of_more_than_a_seco
     status = stream.follow_to_the_end()
     assert (status["state"], status["fault"]) == (wire.DONE, 0)
     triggers = 210 * 100
-    print(f"{triggers} triggers, {stream.requests} requests, {stream.backlog_max} of {LOG_ENTRIES} waiting at most")
+    claims.counted(f"USB at 20 000 slots/s: {triggers} triggers, {stream.requests} requests, {stream.backlog_max} of {LOG_ENTRIES} waiting at most")
     assert (stream.lost, stream.skipped) == (0, 0)
     assert [entry[1] for entry in stream.entries] == list(range(triggers))
     assert [(entry[2], entry[3]) for entry in stream.entries] == [divmod(n, 100) for n in range(triggers)]
@@ -82,7 +82,6 @@ def test_the_fastest_slots_of_a_shift_clock_play_right_and_one_tick_less_is_refu
     # 3 ticks until the shifter is told, 4 until its first word, one a word of 32 bits, one for its phase; then the gap.
     limit = 3 + 4 + BIT_TICKS[driver_mhz] * CHAIN_BITS + 6 + 1 + hello["slot_gap_ticks"]
     assert hello["shift_ticks"] + hello["slot_gap_ticks"] == limit
-    print(f"drivers of {driver_mhz} MHz: {limit} ticks a slot, {TICK_HZ / limit:.0f} slots/s")
     with pytest.raises(BoardError, match=f"period must be at least {limit} ticks"):
         link.load(fast_program(limit - 1, cycles=4))
     program = fast_program(limit, cycles=4, exposure_ticks=limit // 2)
@@ -95,4 +94,5 @@ def test_the_fastest_slots_of_a_shift_clock_play_right_and_one_tick_less_is_refu
     assert report["right"], report
     clocks = [tick for tick, name, level in check_trace.read_vcd(board.trace) if name == "CLK" and level]
     assert min(b - a for a, b in zip(clocks, clocks[1:])) == BIT_TICKS[driver_mhz]
+    claims.measured(f"drivers of {driver_mhz} MHz: {limit} ticks a slot, {TICK_HZ / limit:.0f} slots/s, every word right")
     assert [entry[1] for entry in stream.entries] == list(range(400))

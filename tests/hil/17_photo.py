@@ -7,7 +7,7 @@ import re
 import pytest
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import BoardError
 from ols_board.log import TriggerStream
 from ols_board.program import CHAIN_BITS
@@ -120,8 +120,7 @@ def test_each_edge_starts_a_cycle_the_stated_ticks_after_it_and_bounces_start_no
     assert [rise + delay for rise in started] == begins and len(begins) == cycles
     assert [begin + 500 for begin in begins] == first_latches
     assert [begin + 2 * period_ticks for begin in begins[:-1]] == ready[1:]
-    print(f"{len(changes)} changes, {status['edges_seen']} edges, {status['edges_missed']} missed; "
-          f"{delay} ticks from edge to cycle")
+    claims.measured(f"photo-receptor: {status['edges_seen']} edges, {status['edges_missed']} missed; {delay} ticks from edge to cycle")
 
     # What did not start a cycle came while one played, and was counted; counting ends with the last cycle.
     played_in = [any(begin < tick < begin + 2 * period_ticks for begin in begins) for tick in photo]

@@ -7,7 +7,7 @@ import random
 import pytest
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.random_program import random_program
 
 FIRST = int(os.environ.get("SEED", 1))
@@ -27,7 +27,7 @@ def test_what_the_pins_do_is_what_a_random_program_says_by_two_checkers(emulated
     report = check_trace.check(board.trace, program)
     assert report["right"], report
     kinds = [("grey" if "levels" in slot else "on/off", slot["kind"]) for slot in program["slots"]]
-    print(f"seed {seed}: {program['cycles']} cycles of {kinds}, {report['own']['triggers']} triggers")
+    claims.measured(f"random program, seed {seed}: {program['cycles']} cycles of {kinds}, {report['own']['triggers']} triggers")
 
 
 def test_random_programs_mix_all_that_a_board_plays():

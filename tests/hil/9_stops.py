@@ -6,7 +6,7 @@ import random
 import pytest
 
 import check_trace
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import BoardError
 from ols_board.program import PERIOD_TICKS, paper_program
 from ols_board.stops import (LIT, MS, clear, injected, last_change_before, levels_after, play_until_stopped,
@@ -69,7 +69,8 @@ def test_emergency_stops_at_random_ticks_are_dark_at_once_every_time_with_the_ri
     assert max(guarded) <= GUARD_STOP_TICKS
     assert max(handled) <= HANDLER_TICKS_MAX
     assert lit > STOPS / 2, "most of the stops were to fall into light"
-    print(f"{STOPS} stops, {lit} while lit: dark after {max(guarded)} ticks, open lamp after {max(handled)} ticks")
+    claims.measured(f"{STOPS} stops, {lit} while lit: dark at most {max(guarded)} ticks after the pad falls, by PIO")
+    claims.counted(f"open lamps among them: dark at most {max(handled)} ticks after the pad falls, by a handler")
 
 
 @pytest.mark.parametrize("input_name, cause", CAUSES.items())
