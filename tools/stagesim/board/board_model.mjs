@@ -31,6 +31,8 @@ export class Board {
    * @param {object} options
    * @param {import('./pins.mjs').BoardPins} options.pins
    * @param {boolean} options.naive
+   * @param {string} options.stepping of the chip
+   * @param {boolean} options.busyHub other devices' packets never leave the USB bus idle
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {object[]} options.injections from parseInjection
@@ -148,7 +150,8 @@ export class Board {
       this.#resetCause = Cause.WATCHDOG;
       this.#parts.lockstep.stop();
     };
-    const start = { cause, reason, scratch, seed, onWatchdog, uniqueId: this.#options.uniqueId };
+    const { uniqueId, stepping } = this.#options;
+    const start = { cause, reason, scratch, seed, onWatchdog, uniqueId, stepping };
     const { naive, violations } = this.#options;
     this.#parts = buildChip({ naive, start, logger: this.#logger, violations });
     this.#parts.pads.onChange = (cycle, levels, driven) => {
@@ -156,6 +159,7 @@ export class Board {
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
+    this.chip.usbCtrl.busyHub = this.#options.busyHub ?? false;
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
     if (startsUsbBoot(scratch)) {

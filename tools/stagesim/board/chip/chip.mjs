@@ -9,16 +9,18 @@ import { Pads } from './pads.mjs';
 import { Pio } from './pio.mjs';
 import { correctProcessor } from './processor.mjs';
 import { correctSystem } from './system.mjs';
+import { revisionOf, SysInfo } from './sysinfo.mjs';
 import { UsbController } from './usb_controller.mjs';
 
 const PIO_PAGES = [0x50200, 0x50300];
 const USB_PAGE = 0x50110;
+const SYSINFO_PAGE = 0x40000;
 
 /**
  * Cycles are those of clk_sys and count from the reset; one is 8 ns from the first on, as if the program found its
  * 125 MHz already running. Both cores' flash and SRAM answer without wait states, and there is one core.
- * @param {{naive?: boolean, start: object, logger: object, violations: import('./violations.mjs').Violations}} options `start` as correctSystem takes it, and the flash
- *   chip's `uniqueId`; `violations` is told what a chip would not forgive
+ * @param {{naive?: boolean, start: object, logger: object, violations: import('./violations.mjs').Violations}} options `start` as correctSystem takes it, the flash
+ *   chip's `uniqueId`, and the chip's `stepping` (b2); `violations` is told what a chip would not forgive
  */
 export function buildChip({ naive = false, start, logger, violations }) {
   const time = { cycle: 0 };
@@ -30,7 +32,9 @@ export function buildChip({ naive = false, start, logger, violations }) {
     chip.peripherals[page] = new Pio(chip, { index, pads, time, naive });
     return chip.peripherals[page];
   });
-  chip.usbCtrl = new UsbController(chip);
+  const revision = revisionOf(start.stepping ?? 'b2');
+  chip.peripherals[SYSINFO_PAGE] = new SysInfo(chip, revision);
+  chip.usbCtrl = new UsbController(chip, time, revision);
   chip.peripherals[USB_PAGE] = chip.usbCtrl;
   correctProcessor(chip);
   correctDma(chip);

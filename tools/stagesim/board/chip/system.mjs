@@ -4,6 +4,7 @@
 import { BasePeripheral } from 'rp2040js';
 
 const RESETS = 0x4000c;
+const RESET_USBCTRL = 1 << 24;
 const BUSCTRL = 0x40030;
 const TIMER = 0x40054;
 const WATCHDOG = 0x40058;
@@ -21,7 +22,7 @@ export function correctSystem(chip, start) {
   chip.peripherals[VREG_AND_CHIP_RESET] = new ChipReset(chip, start.cause);
   chip.peripherals[ROSC] = new RingOscillator(chip, start.seed);
   chip.peripherals[BUSCTRL].writeUint32 = () => {}; // priorities: nobody contends for the bus here
-  correctResets(chip.peripherals[RESETS]);
+  correctResets(chip.peripherals[RESETS], chip);
   correctTimer(chip.peripherals[TIMER]);
 
   const watchdog = chip.peripherals[WATCHDOG];
@@ -41,8 +42,15 @@ export function watchdogLegacy(chip) {
 }
 
 /** Blocks are held in reset until the program lets them go (datasheet 2.14.3). */
-function correctResets(resets) {
-  resets.reset = 0x01ffffff;
+function correctResets(resets, chip) {
+  let reset = 0x01ffffff;
+  Object.defineProperty(resets, 'reset', {
+    get: () => reset,
+    set: (value) => {
+      if (value & ~reset & RESET_USBCTRL) chip.usbCtrl.reset();
+      reset = value;
+    },
+  });
   Object.defineProperty(resets, 'reset_done', { get: () => ~resets.reset & 0x01ffffff, set: () => {} });
 }
 

@@ -10,10 +10,10 @@ const SRAM = 0x20000000;
 const BRANCH_TO_SELF = 0xe7fe;
 
 export class Bench {
-  constructor({ naive = false } = {}) {
+  constructor({ naive = false, stepping } = {}) {
     const logger = { debug() {}, info() {}, warn() {}, error(name, text) { throw new Error(`${name}: ${text}`); } };
     const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), seed: 1, onWatchdog: () => {},
-                    uniqueId: new Uint8Array(8) };
+                    uniqueId: new Uint8Array(8), stepping };
     this.violations = new Violations(() => {});
     Object.assign(this, buildChip({ naive, start, logger, violations: this.violations }));
     this.edges = [];
