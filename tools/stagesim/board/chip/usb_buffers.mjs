@@ -20,6 +20,7 @@ export class UsbBuffers {
   #chip;
   #time;
   #note;
+  #isOn;
   #mayTake;
   #words = new Uint32Array(CONTROL_WORDS); // the controls as last written, by either side
   #fields = new Uint16Array(2 * 32); // of each buffer, what the controller has seen
@@ -33,12 +34,14 @@ export class UsbBuffers {
    * @param {object} options
    * @param {{cycle: number}} options.time
    * @param {(section: string, text: string) => void} options.note
+   * @param {() => boolean} options.isOn a controller that is off owns nothing
    * @param {(half: number) => boolean} options.mayTake whether the program may now write to what the controller owns
    */
-  constructor(chip, { time, note, mayTake }) {
+  constructor(chip, { time, note, isOn, mayTake }) {
     this.#chip = chip;
     this.#time = time;
     this.#note = note;
+    this.#isOn = isOn;
     this.#mayTake = mayTake;
   }
 
@@ -68,7 +71,7 @@ export class UsbBuffers {
   /** A write of the program. @returns {boolean} whether an endpoint may have become ready */
   written(offset, value) {
     if (offset >= BUFFERS) {
-      if (this.#owned[offset >> 6]) this.#note('4.1.2.5.1', 'the program wrote to a buffer that the controller owns: either packet may go out');
+      if (this.#owned[offset >> 6] && this.#isOn()) this.#note('4.1.2.5.1', 'the program wrote to a buffer that the controller owns: either packet may go out');
       return false;
     }
     const before = this.#words[offset >> 2];
@@ -82,7 +85,7 @@ export class UsbBuffers {
     if (offset >= ENDPOINT_CONTROLS && value >>> 0 !== before) {
       const half = offset >> 2;
       const owned = (this.#fields[2 * half] | this.#fields[2 * half + 1]) & Buffer.AVAILABLE;
-      if (owned) this.#note('4.1.2.5.3', 'an endpoint control was changed while the controller owns a buffer of that endpoint');
+      if (owned && this.#isOn()) this.#note('4.1.2.5.3', 'an endpoint control was changed while the controller owns a buffer of that endpoint');
     }
     return false;
   }
@@ -92,7 +95,7 @@ export class UsbBuffers {
     if (value === before) return;
     const now = this.#time.cycle;
     if (this.#fields[n] & Buffer.AVAILABLE) {
-      if (!this.#mayTake(half)) {
+      if (this.#isOn() && !this.#mayTake(half)) {
         this.#note('4.1.2.5.1', 'a buffer control was written while the controller owns the buffer, which may be in use');
       }
       this.#own(n, -1);

@@ -66,7 +66,7 @@ export class UsbController extends BasePeripheral {
     this.#revision = revision;
     this.#registers = new UsbRegisters((text) => chip.violations.note('4.1.4', `USB: ${text}`));
     const note = (section, text) => chip.violations.note(section, `USB: ${text}`);
-    this.#buffers = new UsbBuffers(chip, { time, note, mayTake: (half) => this.#mayTake(half) });
+    this.#buffers = new UsbBuffers(chip, { time, note, isOn: () => this.#isOn, mayTake: (half) => this.#mayTake(half) });
     /** Called when the program may have made an endpoint ready to answer, or changed its pull-up. */
     this.onReady = () => {};
     this.powered = false;
@@ -319,7 +319,7 @@ export class UsbController extends BasePeripheral {
 
   /** Revoking a buffer goes by EP_ABORT, which chips before B2 do not come out of (RP2040-E2): they have no other way than this. */
   #mayTake(half) {
-    return this.#revision < REVISION_B2 || !this.#isOn || ((this.#abortDone >>> half) & 1) === 1;
+    return this.#revision < REVISION_B2 || ((this.#abortDone >>> half) & 1) === 1;
   }
 
   get #sieStatus() {

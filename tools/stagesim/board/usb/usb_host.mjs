@@ -270,7 +270,6 @@ export class UsbHost {
     if (request.type === 'control') {
       entry.transfer = new ControlTransfer(request.setup, request.data);
       entry.transfer.packetBytes = this.#packetBytes.get(0);
-      this.#noteToggleRestart(request.setup);
     } else {
       const packetBytes = this.#packetBytes.get(request.endpoint);
       if (packetBytes === undefined) {
@@ -297,8 +296,8 @@ export class UsbHost {
    *  all (USB 2.0 9.4.5, 9.1.1.5, 9.4.10). */
   #noteToggleRestart(setup) {
     if (setup[0] === 0x02 && setup[1] === CLEAR_FEATURE) this.#toggle(setup[4]).data1 = false;
-    if (setup[0] === 0x00 && setup[1] === SET_CONFIGURATION) this.#toggles.clear();
-    if (setup[0] === 0x01 && setup[1] === SET_INTERFACE) for (const toggle of this.#toggles.values()) toggle.data1 = false;
+    const all = (setup[0] === 0x00 && setup[1] === SET_CONFIGURATION) || (setup[0] === 0x01 && setup[1] === SET_INTERFACE);
+    if (all) for (const toggle of this.#toggles.values()) toggle.data1 = false;
   }
 
   /** Puts the next transaction on the bus, pipe after pipe, skipping those that would only be NAKed. */
@@ -360,6 +359,7 @@ export class UsbHost {
       this.#busAlarm.cancel();
       this.#onBus = null;
     }
+    if (status === Status.OK && entry.request.type === 'control') this.#noteToggleRestart(entry.request.setup);
     const { done } = entry.request;
     entry.request.done = () => {};
     done(status, entry.transfer && status === Status.OK ? entry.transfer.bytes : new Uint8Array(0));
