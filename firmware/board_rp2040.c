@@ -12,7 +12,8 @@ enum { WATCHDOG_US = 20000, WAKE_US = 1000 };
 // are no faults.
 #define RUNNING_MAGIC 0x6f6c7321u
 
-static volatile bool woken;
+volatile bool board_is_woken;
+static uint32_t slept_us;
 static bool reset_by_watchdog;
 
 static const uint8_t output_pins[] = BOARD_OUTPUT_PINS;
@@ -64,7 +65,7 @@ static void init_pins(void) {
 void board_init(void) {
     reset_blocks(RESET_IO_BANK0 | RESET_PADS_BANK0);
     init_pins();
-    reset_blocks(RESET_BUSCTRL | RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
+    reset_blocks(RESET_SYSINFO | RESET_BUSCTRL | RESET_PIO0 | RESET_PIO1 | RESET_DMA | RESET_TIMER | RESET_USBCTRL);
     BUSCTRL_BUS_PRIORITY = BUS_PRIORITY_DMA;  // the processor waits rather than a FIFO
     TIMER_INTE = 1u << BOARD_ALARM_TICK | 1u << BOARD_ALARM_HEARTBEAT | 1u << BOARD_ALARM_TRIGGER;
     reset_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH(3) == RUNNING_MAGIC;
@@ -105,10 +106,6 @@ uint64_t board_time_us(void) {
     }
 }
 
-void board_wake(void) {
-    woken = true;
-}
-
 void board_watch_can_interrupt(void) {
     GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
     REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_CAN_INTERRUPT)) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
@@ -123,9 +120,15 @@ void board_raise_can_interrupt(void) {
 void board_sleep(void) {
     TIMER_ALARM(BOARD_ALARM_TICK) = TIMER_RAW_LOW + WAKE_US;
     __asm volatile("cpsid i" ::: "memory");
-    if (!woken) __asm volatile("wfi");  // wakes on a pending interrupt although they are masked (ARMv6-M B1.5.19)
+    const uint32_t begin_us = TIMER_RAW_LOW;
+    if (!board_is_woken) __asm volatile("wfi");  // wakes on a pending interrupt although masked (ARMv6-M B1.5.19)
+    slept_us += TIMER_RAW_LOW - begin_us;
     __asm volatile("cpsie i" ::: "memory");
-    woken = false;
+    board_is_woken = false;
+}
+
+uint32_t board_slept_us(void) {
+    return slept_us;
 }
 
 void board_feed_watchdog(void) {

@@ -35,7 +35,10 @@ void interrupt_heartbeat(void) {
 
 void interrupt_usb(void) {
     const uint32_t interrupts = USB_INTS;
-    if (interrupts & (USB_INT_BUS_RESET | USB_INT_SUSPEND) && link_usb_has_armed()) stop_now(OLS_FAULT_HOST_LOST);
+    // The suspend state's change is no loss by itself: the end of a suspension is one, too.
+    const bool is_lost =
+        interrupts & USB_INT_BUS_RESET || (interrupts & USB_INT_SUSPEND && USB_SIE_STATUS & USB_SIE_SUSPENDED);
+    if (is_lost && link_usb_has_armed()) stop_now(OLS_FAULT_HOST_LOST);
     REGISTER_CLEAR(USB_INTE) = interrupts;  // until usb_poll
     board_wake();
 }

@@ -24,7 +24,7 @@ int main(void) {
     interrupts_init();
     for (;;) {
         board_feed_watchdog();
-        usb_poll();
+        usb_poll(!stage_is_armed());
         can_poll();
         stage_poll(link_host_is_there());
         if (!link_poll()) board_sleep();

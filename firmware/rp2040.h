@@ -24,6 +24,7 @@ enum {
     RESET_PLL_USB = 1 << 13,
     RESET_SPI0 = 1 << 16,
     RESET_SPI1 = 1 << 17,
+    RESET_SYSINFO = 1 << 19,
     RESET_TIMER = 1 << 21,
     RESET_USBCTRL = 1 << 24
 };
@@ -113,12 +114,16 @@ enum {
     GPIO_FUNCTION_SIO = 5,
     GPIO_FUNCTION_PIO0 = 6,
     GPIO_FUNCTION_PIO1 = 7,
+    GPIO_FUNCTION_USB_MUXING =
+        8,  // GPIO 15: the controller's D+ while USB_MUXING_TO_DIGITAL_PAD (appendix B, RP2040-E5)
     GPIO_FUNCTION_NONE = 31,
     GPIO_OUTPUT_INVERTED = 1 << 8,
     GPIO_OUTPUT_LOW = 2 << 8,
     GPIO_OUTPUT_HIGH = 3 << 8,
+    GPIO_OUTPUT_NEVER = 2 << 12,
     GPIO_OUTPUT_ALWAYS = 3 << 12,
     GPIO_INPUT_INVERTED = 1 << 16,
+    GPIO_INPUT_HIGH = 3 << 16,
     PAD_SCHMITT = 1 << 1,
     PAD_PULL_DOWN = 1 << 2,
     PAD_PULL_UP = 1 << 3,
@@ -219,18 +224,29 @@ enum {
     DMA_REQUEST_NONE = 0x3f
 };
 
+// System information: 1 in the top four bits for B0 and B1, 2 for B2 (2.20)
+#define SYSINFO_CHIP_ID REGISTER(0x40000000)
+#define SYSINFO_CHIP_REVISION (SYSINFO_CHIP_ID >> 28)
+
 // USB device controller (4.1.4) and its memory (4.1.2.5)
 #define USB_MEMORY 0x50100000
 #define USB_ADDR_ENDP REGISTER(0x50110000)
 #define USB_MAIN_CTRL REGISTER(0x50110040)
+#define USB_SOF_RD REGISTER(0x50110048)  // a read clears USB_INT_SOF
 #define USB_SIE_CTRL 0x5011004c
 #define USB_SIE_STATUS REGISTER(0x50110050)
 #define USB_SIE_STATUS_CLEAR REGISTER_CLEAR(0x50110050)
 #define USB_BUFF_STATUS REGISTER(0x50110058)
 #define USB_BUFF_STATUS_CLEAR REGISTER_CLEAR(0x50110058)
+#define USB_EP_ABORT 0x50110060
+#define USB_EP_ABORT_DONE REGISTER(0x50110064)
+#define USB_EP_ABORT_DONE_CLEAR REGISTER_CLEAR(0x50110064)
 #define USB_EP_STALL_ARM REGISTER(0x50110068)
 #define USB_MUXING REGISTER(0x50110074)
 #define USB_PWR REGISTER(0x50110078)
+#define USB_PHY_DIRECT REGISTER(0x5011007c)
+#define USB_PHY_DIRECT_OVERRIDE REGISTER(0x50110080)
+#define USB_INTR REGISTER(0x5011008c)
 #define USB_INTE 0x50110090
 #define USB_INTS REGISTER(0x50110098)
 #define USB_ENDPOINT_CONTROL_IN(endpoint) REGISTER(USB_MEMORY + 8 * (endpoint))
@@ -243,16 +259,23 @@ enum {
     USB_SIE_EP0_INT_1BUF = 1 << 29,
     USB_SIE_BUS_RESET = 1 << 19,
     USB_SIE_SETUP_REC = 1 << 17,
-    USB_SIE_RESUME = 1 << 11,
-    USB_SIE_SUSPENDED = 1 << 4,
+    USB_SIE_CONNECTED = 1 << 16,
+    USB_SIE_SUSPENDED = 1 << 4,  // read only; writing it clears USB_INT_SUSPEND
+    USB_SIE_LINE_STATE = 3 << 2,
+    USB_SIE_LINE_SE0 = 0 << 2,
+    USB_SIE_ERRORS = 0xf << 24,  // RX_TIMEOUT, RX_OVERFLOW, BIT_STUFF_ERROR, CRC_ERROR
     USB_MUXING_TO_PHY = 1 << 0,
+    USB_MUXING_TO_DIGITAL_PAD = 1 << 2,
     USB_MUXING_SOFTCON = 1 << 3,
+    USB_PHY_DP_PULLUP = 1 << 1,
+    USB_PHY_DP_PULLUP_OVERRIDE = 1 << 2,
     USB_PWR_VBUS_DETECT = 1 << 2,
     USB_PWR_VBUS_DETECT_OVERRIDE = 1 << 3,
     USB_INT_BUFF_STATUS = 1 << 4,
     USB_INT_BUS_RESET = 1 << 12,
-    USB_INT_SUSPEND = 1 << 14,
+    USB_INT_SUSPEND = 1 << 14,  // the state has changed, either way
     USB_INT_SETUP_REQ = 1 << 16,
+    USB_INT_SOF = 1 << 17,
     USB_ENDPOINT_INTERRUPT = 1 << 29,
     USB_ENDPOINT_BULK = 2 << 26,
     USB_BUFFER_FULL = 1 << 15,
@@ -270,6 +293,7 @@ enum {
 
 // Cortex-M0+ (2.4.8)
 #define NVIC_ISER REGISTER(0xe000e100)
+#define NVIC_ICER REGISTER(0xe000e180)
 #define NVIC_ISPR REGISTER(0xe000e200)
 // Two bits each, highest in a byte: 0 interrupts 1, and so on
 #define NVIC_IPR(interrupt) REGISTER(0xe000e400 + (interrupt) / 4 * 4)

@@ -3,13 +3,16 @@
 #ifndef OLS_USB_H
 #define OLS_USB_H
 
+#include <stdbool.h>
+
 #include "transport.h"
 
 // Appears on the bus. Once, after board_init.
 void usb_init(void);
 
-// Once each turn of the main loop: serves control requests and moves packets.
-void usb_poll(void);
+// Once each turn of the main loop: serves control requests and moves packets. What borrows GPIO 15 (usb_line.h) waits until
+// nothing is armed.
+void usb_poll(bool nothing_is_armed);
 
 extern const struct transport usb_transport;
 

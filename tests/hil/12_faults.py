@@ -20,8 +20,9 @@ from ols_board.stops import LIT, MS, injected, wait_for_fault
 ROUNDS = int(os.environ.get("FAULTS", 4))  # of each fault
 HANDLER_TICKS_MAX = 1250  # 10 us
 SUSPEND_TICKS = 3 * MS  # an idle bus is a suspended one (USB 2.0 7.1.7.6)
-BUS_RESET_TICKS = 10 * MS  # that the emulated host resets for (USB 2.0 7.1.7.5)
+BUS_RESET_TICKS = 0  # a bus reset shows as it begins
 TIMER_TICKS = 2 * 125  # the timer's steps, twice
+READ_BEFORE_TICKS = 50 * 125  # and some of the program's words are checked in between
 GAP_TRIGGER = {"offset_ticks": EXPOSURE_TICKS, "width_ticks": PERIOD_TICKS - EXPOSURE_TICKS - 20}  # to a cycle's end
 
 
@@ -129,7 +130,9 @@ def test_a_fault_at_a_random_tick_is_dark_in_time_with_its_cause(emulated, injec
             assert abs(status["fault_ticks"] - noticed) <= HANDLER_TICKS_MAX
         else:  # the last note before it, at most two turns of the main loop old
             assert 0 <= noticed - status["fault_ticks"] <= 2 * MS
-            assert status["fault_slot"] == status["fault_ticks"] // PERIOD_TICKS % 18
+            # The slot is read before the time, within the same turn.
+            assert status["fault_slot"] in {(status["fault_ticks"] - before) // PERIOD_TICKS % 18
+                                            for before in (0, READ_BEFORE_TICKS)}
     report(f"{injection}: {cause}", dark)
 
 

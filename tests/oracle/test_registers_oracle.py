@@ -16,7 +16,6 @@ SVD = next(iter(CARGO.glob("registry/src/*/rp2040-pac-0.6.0/svd/rp2040.svd")), N
 NAMES = {"USBCTRL": "USBCTRL_REGS"}
 # Where the table says something else on purpose.
 DIFFERENT = {
-    ("USBCTRL", "SIE_STATUS"): 0x300,  # SPEED: a host's; read only in the datasheet since
     **{("DMA", f"CH{n}_{alias}_CTRL"): 0x9F000000 for n in range(12) for alias in ("AL1", "AL2", "AL3")},  # without fields there
     ("PPB", "SYST_CVR"): 0xFF000000,  # any write clears it (ARMv6-M B3.3.5)
     ("PPB", "VTOR"): 0,

@@ -95,7 +95,7 @@ class EmulatedBoard:
         assert self.process.returncode in (0, EXIT_VIOLATION), self.log
         statistics = json.loads(self.log.strip().splitlines()[-1])
         if not self.may_violate:
-            assert statistics["violations"] == []
+            assert statistics["violations"] == [], statistics["violations"]
         return statistics
 
     def __enter__(self):

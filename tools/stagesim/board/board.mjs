@@ -39,6 +39,8 @@ async function main() {
     canBus,
     pins,
     naive: options.naive,
+    stepping: options.stepping,
+    busyHub: options.busyHub,
     seed: options.seed,
     uniqueId: options.boardId,
     roscHz: options.roscHz,

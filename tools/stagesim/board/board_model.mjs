@@ -30,6 +30,8 @@ export class Board {
    * @param {object} options
    * @param {import('./pins.mjs').BoardPins} options.pins
    * @param {boolean} options.naive
+   * @param {string} options.stepping of the chip
+   * @param {boolean} options.busyHub other devices' packets never leave the USB bus idle
    * @param {number} options.seed
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {number} options.roscHz of the ring oscillator, from which it boots
@@ -159,9 +161,9 @@ export class Board {
     };
     const onLoader = (why) =>
       this.#options.log(`in the USB boot loader, which is not emulated, ${why}; a reset starts the boot ROM again`);
+    const { naive, violations, roscHz, crystal_ms, stepping } = this.#options;
     const start = { cause, ...kept, seed, onWatchdog, onLoader };
-    const { naive, violations, roscHz, crystal_ms } = this.#options;
-    this.#parts = buildChip({ naive, start, flash: this.#flash, roscHz, crystal_ms, violations });
+    this.#parts = buildChip({ naive, start, flash: this.#flash, roscHz, crystal_ms, stepping, violations });
     this.#parts.pads.onChange = (cycle, levels, driven) => {
       this.#can?.pinsChanged(levels, driven);
       if (this.#boot.driven === null && (driven & this.pins.mask) === this.pins.mask) this.#boot.driven = cycle;
@@ -169,6 +171,7 @@ export class Board {
     };
     this.#boot = { cause, driven: null, attached: null };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
+    this.chip.usbCtrl.busyHub = this.#options.busyHub ?? false;
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
   }

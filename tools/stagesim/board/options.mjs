@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The command line of the emulated board.
 import { parseArgs } from 'node:util';
+import { STEPPINGS } from './chip/sysinfo.mjs';
 import { parseInjection } from './injections.mjs';
 
 export const USAGE = `usage: node board.mjs --image FILE [options]
@@ -13,6 +14,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --rosc-mhz F        of the ring oscillator from which it boots, 1.8 to 12 (default 6.5)
   --crystal-ms F      that the crystal takes to swing (default 6)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
+  --busy-hub          on the cable's hub, other devices' packets never leave the bus idle
+  --chip-revision R   the chip's stepping: b0, b1 or b2 (default b2)
   --can SOCKET        fit a CAN controller, and listen there for nodes of its bus ("CAN frames over a socket")
   --can-kbit-s N      the bus's bit rate (default 1000)
   --exposures SOCKET  connect there and send every exposure as a JSON line
@@ -29,7 +32,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
                       may be given several times.
                       reset, watchdog, hardfault; hang: the main program stops, lockup: handlers, too; starve: DMA,
                       or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
-                      suspend and busreset of USB; estop, overtemperature, openlamp pull that input low, release
+                      suspend and busreset of USB; sleep and resume of its host; buserror garbles the next bulk IN,
+                      fatalbuserror so that the controller locks up (RP2040-E15), usblockup locks it up at once; estop, overtemperature, openlamp pull that input low, release
                       lets all go high; genlock and genlockfall are edges of that input
   --stats             print ticks, speed, dropped lines and violations as JSON at the end
   --help
@@ -48,7 +52,8 @@ export function parseOptions(args) {
     ({ values } = parseArgs({
       args,
       options: {
-        image: text, board: text, usb: text, can: text, 'can-kbit-s': { ...text, default: '1000' }, exposures: text, vcd: text, pace: { ...text, default: 'virtual' },
+        image: text, board: text, usb: text, can: text, 'can-kbit-s': { ...text, default: '1000' }, exposures: text, vcd: text,
+        'busy-hub': flag, 'chip-revision': { ...text, default: 'b2' }, pace: { ...text, default: 'virtual' },
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
@@ -62,11 +67,16 @@ export function parseOptions(args) {
   if (values.help) return values;
   if (!values.image) throw new Error('--image is missing; see --help');
   if (!['virtual', 'wall'].includes(values.pace)) throw new Error(`--pace ${values.pace}: it is virtual or wall`);
+  if (!STEPPINGS.includes(values['chip-revision'])) {
+    throw new Error(`--chip-revision ${values['chip-revision']}: it is one of ${STEPPINGS.join(', ')}`);
+  }
   const chainBits = integer('--chain-bits', values['chain-bits'], 4);
   if (chainBits % 4 !== 0) throw new Error(`--chain-bits ${chainBits}: not a multiple of 4`);
   return {
     ...values,
     chainBits,
+    stepping: values['chip-revision'],
+    busyHub: values['busy-hub'],
     canBitRate: 1000 * integer('--can-kbit-s', values['can-kbit-s'], 1),
     seed: integer('--seed', values.seed, 0),
     roscHz: 1e6 * number('--rosc-mhz', values['rosc-mhz'], 1.8, 12),

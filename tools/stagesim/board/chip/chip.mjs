@@ -14,12 +14,13 @@ import { QspiPins } from './qspi_pins.mjs';
 import { Resets } from './resets.mjs';
 import { Ssi } from './ssi.mjs';
 import { StoredRegisters } from './stored_registers.mjs';
+import { revisionOf, SysInfo } from './sysinfo.mjs';
 import { ChipReset, correctTimer, RingOscillator } from './system.mjs';
 import { UsbController } from './usb_controller.mjs';
 import { Watchdog } from './watchdog.mjs';
 import { Xip, XipControl } from './xip.mjs';
 
-const PAGES = { XIP_CTRL: 0x14000, XIP_SSI: 0x18000, CLOCKS: 0x40008, RESETS: 0x4000c, PSM: 0x40010, IO_QSPI: 0x40018,
+const PAGES = { XIP_CTRL: 0x14000, XIP_SSI: 0x18000, SYSINFO: 0x40000, CLOCKS: 0x40008, RESETS: 0x4000c, PSM: 0x40010, IO_QSPI: 0x40018,
                 PADS_QSPI: 0x40020, XOSC: 0x40024, PLL_SYS: 0x40028, PLL_USB: 0x4002c, BUSCTRL: 0x40030, TIMER: 0x40054,
                 WATCHDOG: 0x40058, ROSC: 0x40060, VREG_AND_CHIP_RESET: 0x40064, USBCTRL: 0x50110, PIO0: 0x50200, PIO1: 0x50300 };
 export const ROSC_HZ = 6_500_000; // 2.17.1; 1.8 to 12 MHz over chips, voltage and temperature
@@ -35,9 +36,11 @@ export const CRYSTAL_MS = 6; // that a Pico's crystal takes to swing; others tak
  * @param {import('./flash_chip.mjs').FlashChip} options.flash
  * @param {number} options.roscHz
  * @param {number} options.crystal_ms
+ * @param {string} options.stepping
  * @param {import('./violations.mjs').Violations} options.violations is told what a chip would not forgive
  */
-export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, crystal_ms = CRYSTAL_MS, violations }) {
+export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, crystal_ms = CRYSTAL_MS, stepping = 'b2',
+                            violations }) {
   const time = { cycle: 0 };
   const chip = new RP2040();
   chip.logger = strictLogger(violations);
@@ -48,7 +51,9 @@ export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, cryst
     return peripheral;
   };
   chip.pio = [0, 1].map((index) => put(`PIO${index}`, new Pio(chip, { index, pads, time, naive })));
-  chip.usbCtrl = put('USBCTRL', new UsbController(chip));
+  const revision = revisionOf(stepping);
+  put('SYSINFO', new SysInfo(chip, revision));
+  chip.usbCtrl = put('USBCTRL', new UsbController(chip, time, revision));
   const clocks = putClocks(chip, put, time, { roscHz, crystal_ms, start });
   const resets = put('RESETS', new Resets(chip, time, clocks));
   const ssi = putFlash(chip, put, time, clocks, flash);

@@ -20,6 +20,7 @@ export class Pads {
   #overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0 };
   #enabledInputs = 0;
   #invertedInputs = 0;
+  #forcedInputs = 0;
   #pulledUp = 0;
   #externalMask = 0;
   #externalLevels = 0;
@@ -101,7 +102,7 @@ export class Pads {
     driven = (driven | overrides.enable) & ~overrides.disable;
     const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
     const levels = (out & driven) | (idle & ~driven);
-    const inputs = (levels & this.#enabledInputs) ^ this.#invertedInputs;
+    const inputs = ((levels & this.#enabledInputs) ^ this.#invertedInputs) | this.#forcedInputs;
     if (inputs !== this.#history[0].inputs) this.#inputsChange(cycle, inputs);
     if (levels === this.levels && driven === this.driven) return;
     this.levels = levels;
@@ -140,6 +141,7 @@ export class Pads {
     const overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0 };
     let enabledInputs = 0;
     let invertedInputs = 0;
+    let forcedInputs = 0;
     let pulledUp = 0;
     for (let n = 0; n < GPIO_COUNT; n++) {
       const bit = 1 << n;
@@ -153,7 +155,8 @@ export class Pads {
       if (pin.outputEnableOverride === 2 || pin.outputDisable) overrides.disable |= bit;
       if (pin.outputEnableOverride === 3) overrides.enable |= bit;
       if (pin.inputEnable) enabledInputs |= bit;
-      if (pin.inputOverride > 1) throw new Error(`GPIO ${n}: inputs forced to a level are not modelled`);
+      if (pin.inputOverride === 2) throw new Error(`GPIO ${n}: inputs forced low are not modelled`);
+      if (pin.inputOverride === 3) forcedInputs |= bit;
       if (pin.inputOverride === 1) invertedInputs |= bit;
       if (pin.pullupEnabled) pulledUp |= bit;
     }
@@ -161,6 +164,7 @@ export class Pads {
     this.#overrides = overrides;
     this.#enabledInputs = enabledInputs;
     this.#invertedInputs = invertedInputs;
+    this.#forcedInputs = forcedInputs;
     this.#pulledUp = pulledUp;
   }
 }

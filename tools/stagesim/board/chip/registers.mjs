@@ -3,6 +3,8 @@
 // the section given). Whatever is not in this table is not modelled, and using it is a violation. tests/oracle compares
 // it with the vendor's own machine-readable list.
 
+import { USB_REGISTERS } from './usb_registers.mjs';
+
 const NONE = 0; // read only
 const ALL = 0xffffffff;
 
@@ -102,14 +104,7 @@ export const BLOCKS = [
                  ...repeated(4, 4, { 'TIMER#': [0x420, ALL] }),
                  MULTI_CHAN_TRIGGER: [0x430, 0xffff], CHAN_ABORT: [0x444, 0xffff], N_CHANNELS: [0x448, NONE],
                  ...repeated(12, 0x40, { 'CH#_DBG_CTDREQ': [0x800, 0x3f], 'CH#_DBG_TCR': [0x804, NONE] }) } },
-  // Of SIE_STATUS, writing CONNECTED and SUSPENDED clears the interrupts that their changes have raised.
-  { name: 'USBCTRL', section: '4.1.4', base: 0x50110000, reset: 24, wants: FULL_CLOCK,
-    registers: { ADDR_ENDP: [0x0, 0x000f007f], MAIN_CTRL: [0x40, 0x80000003], SOF_RD: [0x48, NONE], SIE_CTRL: [0x4c, 0xff07bf5f],
-                 SIE_STATUS: [0x50, 0xff0f0810], BUFF_STATUS: [0x58, ALL], BUFF_CPU_SHOULD_HANDLE: [0x5c, NONE],
-                 EP_ABORT: [0x60, ALL], EP_ABORT_DONE: [0x64, ALL], EP_STALL_ARM: [0x68, 0x3], NAK_POLL: [0x6c, 0x03ff03ff],
-                 EP_STATUS_STALL_NAK: [0x70, ALL], USB_MUXING: [0x74, 0xf], USB_PWR: [0x78, 0x3f],
-                 USBPHY_DIRECT: [0x7c, 0xff77], USBPHY_DIRECT_OVERRIDE: [0x80, 0x9fff], INTR: [0x8c, NONE], INTE: [0x90, 0xfffff],
-                 INTF: [0x94, 0xfffff], INTS: [0x98, NONE] } },
+  { name: 'USBCTRL', section: '4.1.4', base: 0x50110000, reset: 24, wants: FULL_CLOCK, registers: USB_REGISTERS },
   { name: 'PIO0', section: '3.7', base: 0x50200000, reset: 10, wants: FULL_CLOCK, registers: PIO },
   { name: 'PIO1', section: '3.7', base: 0x50300000, reset: 11, wants: FULL_CLOCK, registers: PIO },
   { name: 'SIO', section: '2.3.1.7', base: 0xd0000000, noAliases: true,

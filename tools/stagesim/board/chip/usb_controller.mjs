@@ -2,159 +2,178 @@
 // The RP2040's USB controller in device mode, packet by packet (RP2040 datasheet 4.1). Takes the place of rp2040js'
 // model, which reports buffers as done before the host has them and knows neither NAK nor STALL.
 import { BasePeripheral } from 'rp2040js';
+import { Buffer, Endpoint, UsbBuffers } from './usb_buffers.mjs';
+import { Interrupt, LEVEL_INTERRUPTS, Register, Sie, UsbRegisters } from './usb_registers.mjs';
 
 const USBCTRL_INTERRUPT = 5;
 
-// Registers (datasheet 4.1.4)
-const ADDR_ENDP = 0x00;
-const MAIN_CTRL = 0x40;
-const SOF_RD = 0x48;
-const SIE_CTRL = 0x4c;
-const SIE_STATUS = 0x50;
-const BUFF_STATUS = 0x58;
-const BUFF_CPU_SHOULD_HANDLE = 0x5c;
-const EP_ABORT = 0x60;
-const EP_ABORT_DONE = 0x64;
-const EP_STALL_ARM = 0x68;
-const NAK_POLL = 0x6c;
-const EP_STATUS_STALL_NAK = 0x70;
-const USB_MUXING = 0x74;
-const USB_PWR = 0x78;
-const INTR = 0x8c;
-const INTE = 0x90;
-const INTF = 0x94;
-const INTS = 0x98;
-
 const MAIN_ENABLE = 1;
+const MAIN_HOST = 2;
 const SIE_PULLUP_EN = 1 << 16;
 const SIE_EP0_DOUBLE = 1 << 30;
 const SIE_EP0_INT_1BUF = 1 << 29;
 const SIE_EP0_INT_2BUF = 1 << 28;
 const PWR_VBUS_DETECT = 1 << 2;
 const PWR_VBUS_OVERRIDE = 1 << 3;
+const MUXING_TO_PHY = 1 << 0;
+const MUXING_TO_DIGITAL_PAD = 1 << 2;
+const PHY_DP_PULLUP = 1 << 1;
+const PHY_DP_PULLUP_OVERRIDE = 1 << 2;
 
-const STATUS_SEQ_ERROR = 0x80000000 | 0;
-const STATUS_BUS_RESET = 1 << 19;
-const STATUS_TRANS_COMPLETE = 1 << 18;
-const STATUS_SETUP = 1 << 17;
-const STATUS_CONNECTED = 1 << 16;
-const STATUS_RESUME = 1 << 11;
-const STATUS_SUSPENDED = 1 << 4;
-const STATUS_LINE_J = 1 << 2;
-const STATUS_VBUS = 1 << 0;
-const STATUS_CLEARABLE = STATUS_SEQ_ERROR | 0x7f000000 | STATUS_BUS_RESET | STATUS_TRANS_COMPLETE | STATUS_SETUP |
-  STATUS_RESUME;
+const GPIO_DP = 15; // while TO_DIGITAL_PAD, with function 8 (appendix B, RP2040-E5)
+const FUNCTION_USB_MUXING = 8;
+const INPUT_FORCED_HIGH = 3;
 
-const INT_SOF = 1 << 17;
-const INT_SETUP = 1 << 16;
-const INT_RESUME = 1 << 15;
-const INT_SUSPEND = 1 << 14;
-const INT_CONN = 1 << 13;
-const INT_BUS_RESET = 1 << 12;
-const INT_VBUS = 1 << 11;
-const INT_SEQ_ERROR = 1 << 5;
-const INT_BUFF_STATUS = 1 << 4;
-const INT_TRANS_COMPLETE = 1 << 3;
-
-// Buffer control, a half for each buffer (datasheet 4.1.2.5.3)
-const BUF_FULL = 1 << 15;
-const BUF_LAST = 1 << 14;
-const BUF_DATA1 = 1 << 13;
-const BUF_STALL = 1 << 11;
-const BUF_AVAILABLE = 1 << 10;
-const BUF_LENGTH = 0x3ff;
-
-// Endpoint control (datasheet 4.1.2.5.2)
-const EP_ENABLE = 0x80000000 | 0;
-const EP_DOUBLE = 1 << 30;
-const EP_INT_1BUF = 1 << 29;
-const EP_INT_2BUF = 1 << 28;
-
-const BUFFER_CONTROLS = 0x80;
-const BUFFER_CONTROLS_END = 0x100;
 const EP0_BUFFER = 0x100;
+const CONNECT_NS = 800_000; // appendix B, RP2040-E5
+const CYCLES_PER_US = 125;
+const E15_SAFE_CYCLES = 800 * CYCLES_PER_US; // appendix B, RP2040-E15: the last 200 us of a frame
+const FRAME_CYCLES = 1000 * CYCLES_PER_US;
+const REVISION_B2 = 2;
 
-/** The answer of the device to one token of the host. `data` is the packet of an answered IN. */
-export const Handshake = Object.freeze({ ACK: 'ack', NAK: 'nak', STALL: 'stall', SILENT: 'silent' });
+/** The bus as LINE_STATE tells it. */
+export const Line = Object.freeze({ SE0: 0, J: 1, K: 2 });
+
+/** The answer of the device to one token of the host; LOST: garbled on the way. */
+export const Handshake = Object.freeze({ ACK: 'ack', NAK: 'nak', STALL: 'stall', SILENT: 'silent', LOST: 'lost' });
 
 export class UsbController extends BasePeripheral {
-  #registers = new Map();
-  #raw = 0;
-  #enable = 0;
-  #force = 0;
-  #status = 0;
+  #time;
+  #revision;
+  #registers;
+  #buffers;
+  #raw = 0; // interrupts that no level of SIE_STATUS raises
+  #status = 0; // the bits of SIE_STATUS that clear by writing 1
+  #suspended = false;
+  #connected = false;
+  #line = Line.SE0; // at the cable
+  #idleSince = null; // settles the connection
   #buffStatus = 0;
+  #abortDone = 0;
   #secondBuffer = 0; // bit 2 * endpoint + out: the last buffer done was buffer 1
   #nextBuffer = 0; // the same bits: buffer 1 is next
+  #frameCycle = -Infinity; // of the last start of frame
+  #lockedUp = false; // RP2040-E15
 
-  /** @param {import('rp2040js').RP2040} chip */
-  constructor(chip) {
+  /**
+   * @param {import('rp2040js').RP2040} chip with `violations`
+   * @param {{cycle: number}} time
+   * @param {number} revision of SYSINFO.CHIP_ID
+   */
+  constructor(chip, time, revision) {
     super(chip, 'USB');
+    this.#time = time;
+    this.#revision = revision;
+    this.#registers = new UsbRegisters((text) => chip.violations.note('4.1.4', `USB: ${text}`));
+    const note = (section, text) => chip.violations.note(section, `USB: ${text}`);
+    this.#buffers = new UsbBuffers(chip, { time, note, isOn: () => this.#isOn, mayTake: (half) => this.#mayTake(half) });
     /** Called when the program may have made an endpoint ready to answer, or changed its pull-up. */
     this.onReady = () => {};
     this.powered = false;
+    /** A hub whose other devices keep the bus from ever being idle. */
+    this.busyHub = false;
   }
 
-  #register(offset) {
-    return this.#registers.get(offset) ?? 0;
+  /** As RESETS leaves the block: every register at its reset value, off the bus. The memory keeps its contents. */
+  reset() {
+    this.#registers.reset();
+    this.#raw = this.#status = this.#buffStatus = this.#abortDone = this.#secondBuffer = this.#nextBuffer = 0;
+    this.#suspended = this.#connected = this.#lockedUp = false;
+    this.#frameCycle = -Infinity;
+    this.#cancelConnection();
+    this.#update();
+    this.onReady();
   }
 
   // What the host's end of the cable sees
 
-  /** True while the program holds D+ up: a full-speed device is there. */
+  /** True while D+ is held up: a full-speed device is there. */
   get attached() {
-    return this.powered && (this.#register(MAIN_CTRL) & MAIN_ENABLE) !== 0 &&
-      (this.#register(SIE_CTRL) & SIE_PULLUP_EN) !== 0;
+    return this.powered && this.#pullsUp;
+  }
+
+  get #pullsUp() {
+    if (this.#registers.get(Register.USBPHY_DIRECT_OVERRIDE) & PHY_DP_PULLUP_OVERRIDE) {
+      return (this.#registers.get(Register.USBPHY_DIRECT) & PHY_DP_PULLUP) !== 0;
+    }
+    return this.#isOn && (this.#registers.get(Register.USB_MUXING) & MUXING_TO_PHY) !== 0 &&
+      (this.#registers.get(Register.SIE_CTRL) & SIE_PULLUP_EN) !== 0;
+  }
+
+  get #isOn() {
+    return (this.#registers.get(Register.MAIN_CTRL) & MAIN_ENABLE) !== 0;
+  }
+
+  /** Whether packets reach an engine that answers. */
+  get #hears() {
+    return this.attached && this.#isOn && this.#connected && !this.#lockedUp &&
+      (this.#registers.get(Register.USB_MUXING) & MUXING_TO_PHY) !== 0;
   }
 
   get address() {
-    return this.#register(ADDR_ENDP) & 0x7f;
+    return this.#registers.get(Register.ADDR_ENDP) & 0x7f;
   }
 
-  /** Plugs or unplugs the cable: VBUS and the idle state of the bus. */
+  /** Plugs or unplugs the cable. */
   setPowered(powered) {
-    if (powered === this.powered) return;
     this.powered = powered;
-    if (powered) this.#status |= STATUS_CONNECTED | STATUS_LINE_J;
-    else this.#status &= ~(STATUS_CONNECTED | STATUS_LINE_J);
-    this.#raw |= INT_CONN;
-    this.#updateVbus();
+    this.#line = Line.J;
+    this.#followLine();
     this.#update();
   }
 
-  #updateVbus() {
-    const power = this.#register(USB_PWR);
-    const present = power & PWR_VBUS_OVERRIDE ? (power & PWR_VBUS_DETECT) !== 0 : this.powered;
-    this.#status = present ? this.#status | STATUS_VBUS : this.#status & ~STATUS_VBUS;
+  /** A bus reset begins (USB 2.0 7.1.7.5). Registers, buffers and address stay for the program to reset. */
+  beginReset() {
+    if (!this.#isOn) return;
+    this.#line = Line.SE0;
+    this.#status |= Sie.BUS_RESET;
+    this.#frameCycle = -Infinity;
+    this.#setSuspended(false);
+    this.#setConnected(false);
+    this.#followLine();
+    this.#update();
   }
 
-  /** A bus reset ends (USB 2.0 7.1.7.5): endpoints start with buffer 0 again, the device answers at address 0. */
-  busReset() {
-    this.#nextBuffer = 0;
-    this.#registers.set(ADDR_ENDP, 0);
-    this.#status = (this.#status | STATUS_BUS_RESET) & ~STATUS_SUSPENDED;
-    this.#update();
+  endReset() {
+    this.#line = Line.J;
+    this.#followLine();
   }
 
   /** The bus was idle for 3 ms (USB 2.0 7.1.7.6). */
   suspend() {
-    this.#status |= STATUS_SUSPENDED;
-    this.#raw |= INT_SUSPEND;
+    if (this.#isOn) this.#setSuspended(true);
+    this.#update();
+  }
+
+  /** The host resumes the bus (USB 2.0 7.1.7.7). */
+  resume() {
+    if (!this.#suspended) return;
+    this.#status |= Sie.RESUME;
+    this.#setSuspended(false);
     this.#update();
   }
 
   startOfFrame(number) {
-    this.#registers.set(SOF_RD, number & 0x7ff);
-    this.#raw |= INT_SOF;
+    if (!this.attached || !this.#isOn || !this.#connected) return;
+    this.#setSuspended(false);
+    this.#registers.set(Register.SOF_RD, number & 0x7ff);
+    this.#frameCycle = this.#time.cycle;
+    this.#raw |= Interrupt.SOF;
     this.#update();
   }
 
-  /** A SETUP packet: always accepted, and ends a stall of endpoint 0 (USB 2.0 8.5.3.4). */
+  /** It answers nothing any more until it is reset, whatever the host does (RP2040-E15). */
+  lockUp() {
+    this.#lockedUp = true;
+    this.onReady();
+  }
+
+  /** A SETUP packet: always accepted, and ends a stall of endpoint 0 (USB 2.0 8.5.3.4). Buffers stay as they are. */
   setup(packet) {
-    if (!this.attached) return Handshake.SILENT;
+    if (!this.#hears) return Handshake.SILENT;
     this.rp2040.usbDPRAM.set(packet, 0);
-    this.#registers.set(EP_STALL_ARM, 0);
-    this.#status |= STATUS_SETUP;
+    this.#registers.set(Register.EP_STALL_ARM, 0);
+    this.#status |= Sie.SETUP;
     this.#update();
     return Handshake.ACK;
   }
@@ -172,158 +191,200 @@ export class UsbController extends BasePeripheral {
   out(endpoint, packet, data1) {
     const found = this.#peek(endpoint, true);
     if (found.handshake !== Handshake.ACK) return { handshake: found.handshake };
-    if (data1 !== ((found.half & BUF_DATA1) !== 0)) {
-      this.#status |= STATUS_SEQ_ERROR;
+    if (data1 !== ((found.fields & Buffer.DATA1) !== 0)) {
+      this.#status |= Sie.SEQ_ERROR;
       this.#update();
       return { handshake: Handshake.ACK };
     }
-    const room = found.half & BUF_LENGTH;
+    const room = found.fields & Buffer.LENGTH;
     const length = Math.min(packet.length, room);
     this.rp2040.usbDPRAM.set(packet.subarray(0, length), found.address);
-    this.#complete(endpoint, true, found, (found.half & ~(BUF_AVAILABLE | BUF_LENGTH)) | BUF_FULL | length);
+    this.#complete(found, (found.fields & ~(Buffer.AVAILABLE | Buffer.LENGTH)) | Buffer.FULL | length);
     return { handshake: Handshake.ACK };
   }
 
-  /** @returns {{handshake: string, packet?: Uint8Array, data1?: boolean}} of an IN transaction. */
-  in(endpoint) {
+  /**
+   * An IN transaction. A bus error garbles its packet: the host does not acknowledge, the controller sees none, and offers it
+   * again; or locks up, if the buffer was handed over in the last 200 us of a frame (RP2040-E15).
+   * @returns {{handshake: string, packet?: Uint8Array, data1?: boolean}}
+   */
+  in(endpoint, busError = false) {
     const found = this.#peek(endpoint, false);
     if (found.handshake !== Handshake.ACK) return { handshake: found.handshake };
-    const length = found.half & BUF_LENGTH;
+    if (busError) {
+      this.#status |= Sie.RX_TIMEOUT;
+      if (this.#wasArmedLate(found)) this.lockUp();
+      this.#update();
+      return { handshake: Handshake.LOST };
+    }
+    const length = found.fields & Buffer.LENGTH;
     const packet = this.rp2040.usbDPRAM.slice(found.address, found.address + length);
-    const data1 = (found.half & BUF_DATA1) !== 0;
-    this.#complete(endpoint, false, found, found.half & ~(BUF_AVAILABLE | BUF_FULL));
+    const data1 = (found.fields & Buffer.DATA1) !== 0;
+    this.#status |= Sie.ACK_REC;
+    this.#complete(found, found.fields & ~(Buffer.AVAILABLE | Buffer.FULL));
     return { handshake: Handshake.ACK, packet, data1 };
   }
 
+  #wasArmedLate({ half, second }) {
+    const age = this.#buffers.armedAt(half, second) - this.#frameCycle; // negative: in an earlier frame
+    return Number.isFinite(age) && ((age % FRAME_CYCLES) + FRAME_CYCLES) % FRAME_CYCLES >= E15_SAFE_CYCLES;
+  }
+
   #peek(endpoint, out) {
-    if (!this.attached) return { handshake: Handshake.SILENT };
-    const view = this.rp2040.usbDPRAMView;
-    const bit = 1 << (endpoint * 2 + (out ? 1 : 0));
-    const control = endpoint === 0 ? this.#ep0Control() : view.getUint32(8 * endpoint + (out ? 4 : 0), true) | 0;
-    if ((control & EP_ENABLE) === 0) return { handshake: Handshake.SILENT };
-    const both = view.getUint32(BUFFER_CONTROLS + 8 * endpoint + (out ? 4 : 0), true);
-    const stallArmed = endpoint !== 0 || (this.#register(EP_STALL_ARM) >> (out ? 1 : 0)) & 1;
-    if (both & BUF_STALL && stallArmed) return { handshake: Handshake.STALL };
-    const second = (control & EP_DOUBLE) !== 0 && (this.#nextBuffer & bit) !== 0;
-    const half = second ? both >>> 16 : both & 0xffff;
-    if ((half & BUF_AVAILABLE) === 0 || (!out && (half & BUF_FULL) === 0)) return { handshake: Handshake.NAK };
+    if (!this.#hears) return { handshake: Handshake.SILENT };
+    const half = 2 * endpoint + (out ? 1 : 0);
+    const bit = 1 << half;
+    const control = endpoint === 0 ? this.#ep0Control() : this.#buffers.endpointControl(half);
+    if ((control & Endpoint.ENABLE) === 0) return { handshake: Handshake.SILENT };
+    if (this.#registers.get(Register.EP_ABORT) & bit) return { handshake: Handshake.NAK };
+    const stallArmed = endpoint !== 0 || (this.#registers.get(Register.EP_STALL_ARM) >> (out ? 1 : 0)) & 1;
+    if (this.#buffers.fields(half, false) & Buffer.STALL && stallArmed) return { handshake: Handshake.STALL };
+    const second = (control & Endpoint.DOUBLE) !== 0 && (this.#nextBuffer & bit) !== 0;
+    const fields = this.#buffers.fields(half, second);
+    const filled = (fields & Buffer.FULL) !== 0;
+    if ((fields & Buffer.AVAILABLE) === 0 || filled === out) return { handshake: Handshake.NAK };
     const base = endpoint === 0 ? EP0_BUFFER : control & 0xffc0;
-    return { handshake: Handshake.ACK, half, second, control, bit, address: base + (second ? 64 : 0) };
+    return { handshake: Handshake.ACK, half, bit, fields, second, control, address: base + (second ? 64 : 0) };
   }
 
-  /** Endpoint 0 has no control word in memory; SIE_CTRL has its bits (datasheet 4.1.2.5.2). */
+  /** Endpoint 0 has no control word in memory; SIE_CTRL has its bits (datasheet 4.1.2.5.3). */
   #ep0Control() {
-    const sie = this.#register(SIE_CTRL);
-    return EP_ENABLE | (sie & SIE_EP0_DOUBLE ? EP_DOUBLE : 0) | (sie & SIE_EP0_INT_1BUF ? EP_INT_1BUF : 0) |
-      (sie & SIE_EP0_INT_2BUF ? EP_INT_2BUF : 0);
+    const sie = this.#registers.get(Register.SIE_CTRL);
+    return Endpoint.ENABLE | (sie & SIE_EP0_DOUBLE ? Endpoint.DOUBLE : 0) |
+      (sie & SIE_EP0_INT_1BUF ? Endpoint.INT_1BUF : 0) | (sie & SIE_EP0_INT_2BUF ? Endpoint.INT_2BUF : 0);
   }
 
-  #complete(endpoint, out, { second, control, bit, half: before }, half) {
-    const view = this.rp2040.usbDPRAMView;
-    view.setUint16(BUFFER_CONTROLS + 8 * endpoint + (out ? 4 : 0) + (second ? 2 : 0), half, true);
-    if (control & EP_DOUBLE) this.#nextBuffer ^= bit;
-    if (control & EP_INT_1BUF || (control & EP_INT_2BUF && second)) {
+  #complete({ half, bit, second, control, fields: before }, fields) {
+    this.#buffers.finish(half, second, fields);
+    if (control & Endpoint.DOUBLE) this.#nextBuffer ^= bit;
+    if (control & Endpoint.INT_1BUF || (control & Endpoint.INT_2BUF && second)) {
       this.#buffStatus |= bit;
       this.#secondBuffer = second ? this.#secondBuffer | bit : this.#secondBuffer & ~bit;
     }
-    if (before & BUF_LAST) this.#status |= STATUS_TRANS_COMPLETE;
+    if (before & Buffer.LAST) this.#status |= Sie.TRANS_COMPLETE;
     this.#update();
+  }
+
+  // The line, and what follows from it
+
+  get #lineState() {
+    const muxing = this.#registers.get(Register.USB_MUXING);
+    if (muxing & MUXING_TO_DIGITAL_PAD) return this.#padIsForcedToJ ? Line.J : Line.SE0;
+    if (!(muxing & MUXING_TO_PHY)) return Line.SE0;
+    if (!this.#pullsUp) return Line.SE0;
+    return this.powered ? this.#line : Line.J;
+  }
+
+  get #padIsForcedToJ() {
+    const pin = this.rp2040.gpio[GPIO_DP];
+    return pin.functionSelect === FUNCTION_USB_MUXING && pin.inputOverride === INPUT_FORCED_HIGH;
+  }
+
+  /** Connected after 800 us of J; chips before B2 are not while others' packets are on the bus (RP2040-E5). */
+  #followLine() {
+    const isForced = (this.#registers.get(Register.USB_MUXING) & MUXING_TO_DIGITAL_PAD) !== 0;
+    const isIdle = this.#isOn && this.#lineState === Line.J &&
+      (isForced || !this.busyHub || this.#revision >= REVISION_B2);
+    if (!isIdle) return this.#cancelConnection();
+    if (this.#connected || this.#idleSince?.scheduled) return undefined;
+    this.#idleSince ??= this.rp2040.clock.createAlarm(() => {
+      this.#setConnected(true);
+      this.#update();
+      this.onReady();
+    });
+    return this.#idleSince.schedule(CONNECT_NS);
+  }
+
+  #cancelConnection() {
+    if (this.#idleSince?.scheduled) this.#idleSince.cancel();
+  }
+
+  /** INTR: "Set when the device suspend state changes", and likewise of the connection. */
+  #setSuspended(suspended) {
+    if (suspended !== this.#suspended) this.#raw |= Interrupt.SUSPEND;
+    this.#suspended = suspended;
+  }
+
+  #setConnected(connected) {
+    if (connected !== this.#connected) this.#raw |= Interrupt.CONN;
+    this.#connected = connected;
   }
 
   // What the program sees
 
   /** rp2040js calls this after each write to the USB memory. */
-  DPRAMUpdated(offset) {
-    if (offset >= BUFFER_CONTROLS && offset < BUFFER_CONTROLS_END) this.onReady();
+  DPRAMUpdated(offset, value) {
+    if (this.#buffers.written(offset, value)) this.onReady();
   }
 
-  #update() {
-    const sources = [[STATUS_SETUP, INT_SETUP], [STATUS_RESUME, INT_RESUME], [STATUS_BUS_RESET, INT_BUS_RESET],
-                     [STATUS_VBUS, INT_VBUS], [STATUS_SEQ_ERROR, INT_SEQ_ERROR],
-                     [STATUS_TRANS_COMPLETE, INT_TRANS_COMPLETE]];
-    for (const [status, interrupt] of sources) {
-      this.#raw = this.#status & status ? this.#raw | interrupt : this.#raw & ~interrupt;
-    }
-    this.#raw = this.#buffStatus ? this.#raw | INT_BUFF_STATUS : this.#raw & ~INT_BUFF_STATUS;
-    this.rp2040.setInterrupt(USBCTRL_INTERRUPT, this.#interruptStatus !== 0);
+  /** Revoking a buffer goes by EP_ABORT, which chips before B2 do not come out of (RP2040-E2): they have no other way than this. */
+  #mayTake(half) {
+    return this.#revision < REVISION_B2 || ((this.#abortDone >>> half) & 1) === 1;
+  }
+
+  get #sieStatus() {
+    const power = this.#registers.get(Register.USB_PWR);
+    const vbus = power & PWR_VBUS_OVERRIDE ? (power & PWR_VBUS_DETECT) !== 0 : this.powered;
+    return this.#status | (this.#connected ? Sie.CONNECTED : 0) | (this.#suspended ? Sie.SUSPENDED : 0) |
+      (this.#lineState << Sie.LINE_STATE_LSB) | (vbus ? Sie.VBUS : 0);
+  }
+
+  get #interruptRaw() {
+    const status = this.#sieStatus;
+    let raw = this.#raw | (this.#buffStatus ? Interrupt.BUFF_STATUS : 0) | (this.#abortDone ? Interrupt.ABORT_DONE : 0);
+    for (const [bit, interrupt] of LEVEL_INTERRUPTS) if (status & bit) raw |= interrupt;
+    return raw;
   }
 
   get #interruptStatus() {
-    return (this.#raw & this.#enable) | this.#force;
+    return (this.#interruptRaw & this.#registers.get(Register.INTE)) | this.#registers.get(Register.INTF);
+  }
+
+  #update() {
+    this.rp2040.setInterrupt(USBCTRL_INTERRUPT, this.#interruptStatus !== 0);
   }
 
   readUint32(offset) {
     switch (offset) {
-      case SOF_RD:
-        this.#raw &= ~INT_SOF;
+      case Register.SOF_RD:
+        this.#raw &= ~Interrupt.SOF;
         this.#update();
-        return this.#register(SOF_RD);
-      case SIE_STATUS:
-        return this.#status >>> 0;
-      case BUFF_STATUS:
-        return this.#buffStatus >>> 0;
-      case BUFF_CPU_SHOULD_HANDLE:
-        return this.#secondBuffer >>> 0;
-      case EP_ABORT_DONE:
-        return this.#register(EP_ABORT); // nothing is ever in the middle of a packet when the program runs
-      case INTR:
-        return this.#raw;
-      case INTE:
-        return this.#enable;
-      case INTF:
-        return this.#force;
-      case INTS:
-        return this.#interruptStatus;
-      default:
-        return this.#register(offset) >>> 0;
+        return this.#registers.get(offset);
+      case Register.SIE_STATUS: return this.#sieStatus >>> 0;
+      case Register.BUFF_STATUS: return this.#buffStatus >>> 0;
+      case Register.BUFF_CPU_SHOULD_HANDLE: return this.#secondBuffer >>> 0;
+      case Register.EP_ABORT_DONE: return this.#abortDone >>> 0;
+      case Register.INTR: return this.#interruptRaw >>> 0;
+      case Register.INTS: return this.#interruptStatus >>> 0;
+      default: return this.#registers.get(offset) >>> 0;
     }
   }
 
-  writeUint32(offset, value) {
-    switch (offset) {
-      case SIE_STATUS:
-        this.#clearStatus(this.rawWriteValue);
-        break;
-      case BUFF_STATUS:
-        this.#buffStatus &= ~this.rawWriteValue;
-        break;
-      case INTE:
-        this.#enable = value & 0xfffff;
-        break;
-      case INTF:
-        this.#force = value & 0xfffff;
-        break;
-      case EP_ABORT_DONE:
-      case EP_STATUS_STALL_NAK:
-      case INTR:
-      case INTS:
-      case SOF_RD:
-        break; // read only, or never set here
-      case ADDR_ENDP:
-      case MAIN_CTRL:
-      case SIE_CTRL:
-      case EP_ABORT:
-      case EP_STALL_ARM:
-      case NAK_POLL:
-      case USB_MUXING:
-      case USB_PWR:
-        this.#registers.set(offset, value);
-        break;
-      default:
-        super.writeUint32(offset, value);
-    }
-    this.#updateVbus();
+  writeUint32Atomic(offset, value, alias) {
+    const { cleared, told } = this.#registers.write(offset, value >>> 0, alias);
+    if (offset === Register.SIE_STATUS) this.#clearStatus(cleared, told);
+    if (offset === Register.BUFF_STATUS) this.#buffStatus &= ~cleared;
+    if (offset === Register.EP_ABORT) this.#abort();
+    if (offset === Register.EP_ABORT_DONE) this.#abortDone &= ~cleared | this.#registers.get(Register.EP_ABORT);
+    if (offset === Register.MAIN_CTRL && this.#registers.get(offset) & MAIN_HOST) throw new Error('USB: host mode is not modelled');
+    this.#followLine();
     this.#update();
     this.onReady();
   }
 
-  /** Bits are cleared by writing 1; those of a level clear the interrupt that its change has raised. */
-  #clearStatus(bits) {
-    this.#status &= ~(bits & STATUS_CLEARABLE);
-    if (bits & STATUS_SUSPENDED) {
-      this.#status &= ~STATUS_SUSPENDED;
-      this.#raw &= ~INT_SUSPEND;
+  /** Those of a level clear the interrupt that its change has raised. */
+  #clearStatus(cleared, told) {
+    this.#status &= ~cleared;
+    if (told & Sie.SUSPENDED) this.#raw &= ~Interrupt.SUSPEND;
+    if (told & Sie.CONNECTED) this.#raw &= ~Interrupt.CONN;
+  }
+
+  /** Done at once: no transaction is cut up here. */
+  #abort() {
+    const aborted = this.#registers.get(Register.EP_ABORT);
+    if (aborted && this.#revision < REVISION_B2) {
+      this.rp2040.violations.note('appendix B, RP2040-E2', 'USB: EP_ABORT was set, which this stepping does not come out of');
     }
-    if (bits & STATUS_CONNECTED) this.#raw &= ~INT_CONN;
+    this.#abortDone |= aborted;
   }
 }

@@ -11,11 +11,11 @@ const SRAM = 0x20000000;
 const BRANCH_TO_SELF = 0xe7fe;
 
 export class Bench {
-  constructor({ naive = false, onWatchdog = () => {} } = {}) {
+  constructor({ naive = false, onWatchdog = () => {}, stepping } = {}) {
     const start = { cause: Cause.POWER, reason: 0, scratch: new Uint32Array(8), crystalTicks: 0, seed: 1, onWatchdog, onLoader: () => {} };
     const flash = new FlashChip(new Uint8Array(256), new Uint8Array(8));
     this.violations = new Violations(() => {});
-    Object.assign(this, buildChip({ naive, start, flash, violations: this.violations }));
+    Object.assign(this, buildChip({ naive, start, flash, stepping, violations: this.violations }));
     assumeBooted(this);
     this.edges = [];
     this.pads.onChange = (cycle, levels) => this.edges.push([cycle, levels]);

@@ -7,14 +7,8 @@ import { UsbHost } from '../usb/usb_host.mjs';
 import { BulkInTransfer, BulkOutTransfer, ControlTransfer, Status } from '../usb/usb_transfer.mjs';
 import { Bench } from './bench.mjs';
 
-const REGS = 0x50110000;
-const RAM = 0x50100000;
-const [MAIN_CTRL, SIE_CTRL, SIE_STATUS, BUFF_STATUS, STALL_ARM, INTE, INTS] =
-  [0x40, 0x4c, 0x50, 0x58, 0x68, 0x90, 0x98].map((offset) => REGS + offset);
-const EP0_IN = RAM + 0x80;
-const EP1_OUT = RAM + 0x8c;
-const EP2_IN = RAM + 0x90;
-const [FULL, DATA1, STALL, AVAILABLE] = [1 << 15, 1 << 13, 1 << 11, 1 << 10];
+import { AVAILABLE, BUFF_STATUS, DATA1, EP0_IN, EP1_OUT, EP2_IN, FULL, INTE, INTR, INTS, RAM, SIE_CTRL, SIE_STATUS, STALL, STALL_ARM,
+         attachUsb, give } from './usb_bench.mjs';
 
 describe('the controller', () => {
   let b;
@@ -22,10 +16,7 @@ describe('the controller', () => {
 
   beforeEach(() => {
     b = new Bench();
-    usb = b.chip.usbCtrl;
-    usb.setPowered(true);
-    b.write(MAIN_CTRL, 1);
-    b.write(SIE_CTRL, (1 << 29) | (1 << 16));
+    usb = attachUsb(b);
     b.write(RAM + 0x0c, 0xa0000180 | 0); // endpoint 1 OUT: enabled, interrupt for each buffer, at 0x180
     b.write(RAM + 0x10, 0xa00001c0 | 0); // endpoint 2 IN, at 0x1c0
   });
@@ -33,7 +24,7 @@ describe('the controller', () => {
   test('answers NAK until the program hands over a buffer, and reports it done only after the host has it', () => {
     assert.equal(usb.in(2).handshake, Handshake.NAK);
     b.write(RAM + 0x1c0, 0x64636261);
-    b.write(EP2_IN, FULL | AVAILABLE | 4);
+    give(b, EP2_IN, FULL | 4);
     assert.equal(b.read(BUFF_STATUS), 0);
     const { handshake, packet, data1 } = usb.in(2);
     assert.deepEqual([handshake, Buffer.from(packet).toString(), data1], [Handshake.ACK, 'abcd', false]);
@@ -45,7 +36,7 @@ describe('the controller', () => {
   });
 
   test('takes an OUT packet with its length, and drops one with the wrong toggle with an error flag', () => {
-    b.write(EP1_OUT, AVAILABLE | 64);
+    give(b, EP1_OUT, 64);
     assert.equal(usb.out(1, Uint8Array.of(9), true).handshake, Handshake.ACK);
     assert.equal(b.read(SIE_STATUS) >>> 31, 1);
     assert.equal(b.read(BUFF_STATUS), 0);
@@ -58,7 +49,7 @@ describe('the controller', () => {
 
   test('two buffers take turns', () => {
     b.write(RAM + 0x0c, 0xe0000180 | 0);
-    b.write(EP1_OUT, (((AVAILABLE | DATA1 | 64) << 16) | AVAILABLE | 64) >>> 0);
+    give(b, EP1_OUT, ((DATA1 | 64) << 16) | 64, (AVAILABLE << 16) | AVAILABLE);
     usb.out(1, Uint8Array.of(1), false);
     usb.out(1, Uint8Array.of(2, 2), true);
     assert.equal(usb.out(1, Uint8Array.of(3), false).handshake, Handshake.NAK);
@@ -80,10 +71,12 @@ describe('the controller', () => {
 
   test('is silent without pull-up, and tells of reset and suspend by interrupts that clear by their status bits', () => {
     b.write(INTE, (1 << 12) | (1 << 14));
-    usb.busReset();
+    usb.beginReset();
     assert.equal(b.read(INTS), 1 << 12);
     b.write(SIE_STATUS, 1 << 19);
     assert.equal(b.read(INTS), 0);
+    usb.endReset();
+    b.run(101_000);
     usb.suspend();
     assert.equal(b.read(INTS), 1 << 14);
     assert.equal((b.read(SIE_STATUS) >> 4) & 1, 1);

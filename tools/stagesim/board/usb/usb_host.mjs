@@ -11,6 +11,9 @@ const RECOVERY_NS = 10 * MS; // USB 2.0 7.1.7.5
 const SET_ADDRESS_NS = 2 * MS; // USB 2.0 9.2.6.3
 const REQUEST_NS = 5000 * MS; // USB 2.0 9.2.6.1
 const SUSPEND_NS = 3 * MS; // USB 2.0 7.1.7.6
+const RESUME_NS = 20 * MS; // USB 2.0 7.1.7.7
+const ERRORS_MAX = 3; // in a row, of one transfer (USB 2.0 8.7.4, and what hosts do)
+const ATTEMPTS_MAX = 3; // to configure a device, each from a bus reset on
 const FRAME_NS = MS;
 const OVERHEAD_BYTES = 13; // of a bulk transaction: sync, PIDs, CRCs, gaps (USB 2.0 5.8.4)
 const BYTE_NS = 8e9 / 12e6;
@@ -21,6 +24,7 @@ const GET_DESCRIPTOR = 6;
 const SET_ADDRESS = 5;
 const SET_CONFIGURATION = 9;
 const CLEAR_FEATURE = 1;
+const SET_INTERFACE = 11;
 const DESCRIPTOR_DEVICE = 1;
 const DESCRIPTOR_CONFIGURATION = 2;
 const DESCRIPTOR_ENDPOINT = 5;
@@ -43,6 +47,9 @@ export class UsbHost {
   #frameAlarm;
   #suspendAlarm;
   #log;
+  #attempts = 0;
+  #asleep = false;
+  #busError = null; // what the next bulk IN meets: 'garbled', or 'fatal' to the controller
 
   /**
    * @param {object} clock of the chip (createAlarm)
@@ -63,7 +70,7 @@ export class UsbHost {
   /** True while something is under way that only needs time to pass. */
   get active() {
     return this.#onBus !== null || this.#suspendAlarm.scheduled || this.#state === 'resetting' ||
-      this.#state === 'configuring';
+      this.#state === 'configuring' || this.#stepAlarm.scheduled;
   }
 
   /** True while transfers wait for the device to answer. */
@@ -73,10 +80,15 @@ export class UsbHost {
 
   /** A device that is plugged in sees an idle bus, and suspends, until the host has debounced the connection. */
   plug() {
-    if (!this.#suspendAlarm.scheduled) this.#suspendAlarm.schedule(SUSPEND_NS);
     this.#controller.setPowered(true);
     this.#state = 'searching';
+    this.#idle();
     this.#deviceMayHaveChanged();
+  }
+
+  /** From now on nothing is on the bus. */
+  #idle() {
+    if (!this.#suspendAlarm.scheduled) this.#suspendAlarm.schedule(SUSPEND_NS);
   }
 
   /** The device sees its power go, and 3 ms later an idle bus. */
@@ -84,19 +96,41 @@ export class UsbHost {
     if (this.#state === 'unplugged') return;
     this.#lose('unplugged');
     this.#controller.setPowered(false);
-    if (!this.#suspendAlarm.scheduled) this.#suspendAlarm.schedule(SUSPEND_NS);
+    this.#idle();
   }
 
   /** Resets the bus and configures the device anew, as a host does that has lost patience with it. */
   resetBus() {
     this.#lose('resetting');
-    this.#after(RESET_NS, () => this.#endReset());
+    this.#beginReset();
   }
 
   /** Sends no more frames: the device sees an idle bus. */
   suspend() {
     this.#lose('failed');
-    this.#suspendAlarm.schedule(SUSPEND_NS);
+  }
+
+  /** The same, but resume() goes on where this left off. */
+  sleep() {
+    this.#asleep = true;
+    this.#frameAlarm.cancel();
+    this.#idle();
+  }
+
+  resume() {
+    if (!this.#asleep) return;
+    this.#suspendAlarm.cancel();
+    this.#controller.resume();
+    this.#after(RESUME_NS, () => {
+      this.#asleep = false;
+      this.#startFrame();
+      this.#startTransaction();
+    });
+  }
+
+  /** The next bulk IN's packet is garbled; if `fatal`, so that the controller locks up (erratum RP2040-E15). */
+  injectBusError(fatal) {
+    this.#busError = fatal ? 'fatal' : 'garbled';
   }
 
   /**
@@ -127,7 +161,9 @@ export class UsbHost {
     const { attached } = this.#controller;
     if (attached && this.#state === 'searching') {
       this.#state = 'resetting';
-      this.#after(DEBOUNCE_NS + RESET_NS, () => this.#endReset());
+      this.#attempts = 0;
+      this.#idle();
+      this.#after(DEBOUNCE_NS, () => this.#beginReset());
     } else if (!attached && !['unplugged', 'searching'].includes(this.#state)) {
       this.#lose('searching');
     } else {
@@ -142,6 +178,9 @@ export class UsbHost {
 
   #lose(state) {
     this.#state = state;
+    this.#asleep = false;
+    this.#controller.endReset();
+    if (state === 'failed') this.#idle(); // the port is left alone
     for (const alarm of [this.#stepAlarm, this.#busAlarm, this.#frameAlarm]) alarm.cancel();
     this.#onBus = null;
     const lost = [...this.#waiting, ...[...this.#queues.values()].flat()];
@@ -150,9 +189,16 @@ export class UsbHost {
     this.#toggles.clear();
   }
 
+  #beginReset() {
+    this.#suspendAlarm.cancel();
+    this.#attempts++;
+    this.#controller.beginReset();
+    this.#after(RESET_NS, () => this.#endReset());
+  }
+
   #endReset() {
     this.#address = 0;
-    this.#controller.busReset();
+    this.#controller.endReset();
     this.#frameAlarm.schedule(FRAME_NS);
     this.#after(RECOVERY_NS, () => this.#configure());
   }
@@ -186,8 +232,7 @@ export class UsbHost {
       if (status === Status.OK) {
         next(bytes);
       } else if (this.#state === 'configuring') {
-        this.#log(`usb: the device answered request ${setup[1]} with status ${status}; giving up on it`);
-        this.#lose('failed');
+        this.#tryAgain(setup[1], status);
       }
     };
     const request = { type: 'control', endpoint: 0, setup: Uint8Array.from(setup), timeout_us: REQUEST_NS / 1000, done };
@@ -196,8 +241,21 @@ export class UsbHost {
     this.#enqueue(entry);
   }
 
+  /** What waits for the device goes on waiting. */
+  #tryAgain(request, status) {
+    const last = this.#attempts >= ATTEMPTS_MAX;
+    this.#log(`usb: the device answered request ${request} with status ${status}; ${last ? 'giving up on it' : 'trying again'}`);
+    const waiting = this.#waiting;
+    if (!last) this.#waiting = [];
+    this.#lose(last ? 'failed' : 'resetting');
+    if (last) return;
+    this.#waiting = waiting;
+    this.#beginReset();
+  }
+
   #configured() {
     this.#state = 'configured';
+    this.#attempts = 0;
     this.#toggles.clear();
     const waiting = this.#waiting;
     this.#waiting = [];
@@ -212,7 +270,6 @@ export class UsbHost {
     if (request.type === 'control') {
       entry.transfer = new ControlTransfer(request.setup, request.data);
       entry.transfer.packetBytes = this.#packetBytes.get(0);
-      this.#noteToggleRestart(request.setup);
     } else {
       const packetBytes = this.#packetBytes.get(request.endpoint);
       if (packetBytes === undefined) {
@@ -235,15 +292,17 @@ export class UsbHost {
     return this.#toggles.get(endpoint);
   }
 
-  /** Clearing an endpoint's halt starts its data toggle again, a configuration those of all (USB 2.0 9.4.5, 9.1.1.5). */
+  /** Clearing an endpoint's halt starts its data toggle again, a configuration or a setting of the only interface those of
+   *  all (USB 2.0 9.4.5, 9.1.1.5, 9.4.10). */
   #noteToggleRestart(setup) {
     if (setup[0] === 0x02 && setup[1] === CLEAR_FEATURE) this.#toggle(setup[4]).data1 = false;
-    if (setup[0] === 0x00 && setup[1] === SET_CONFIGURATION) this.#toggles.clear();
+    const all = (setup[0] === 0x00 && setup[1] === SET_CONFIGURATION) || (setup[0] === 0x01 && setup[1] === SET_INTERFACE);
+    if (all) for (const toggle of this.#toggles.values()) toggle.data1 = false;
   }
 
   /** Puts the next transaction on the bus, pipe after pipe, skipping those that would only be NAKed. */
   #startTransaction() {
-    if (this.#onBus !== null) return;
+    if (this.#onBus !== null || this.#asleep) return;
     const pipes = [...this.#queues.keys()].sort((a, b) => a - b);
     const start = pipes.findIndex((pipe) => pipe > this.#lastPipe);
     const order = start < 0 ? pipes : [...pipes.slice(start), ...pipes.slice(0, start)];
@@ -264,17 +323,31 @@ export class UsbHost {
     const { entry, token } = this.#onBus;
     this.#onBus = null;
     const answer = this.#transact(token);
-    if (answer.handshake !== Handshake.NAK) {
-      const status = entry.transfer.answered(answer);
-      if (status !== null) this.#finish(entry, status);
-    }
+    const status = this.#statusAfter(entry, answer);
+    if (status !== null) this.#finish(entry, status);
     this.#startTransaction();
+  }
+
+  /** A transaction without an answer is tried again, three times in all. */
+  #statusAfter(entry, answer) {
+    if (answer.handshake === Handshake.NAK) return null;
+    if (answer.handshake === Handshake.SILENT || answer.handshake === Handshake.LOST) {
+      entry.errors = (entry.errors ?? 0) + 1;
+      return entry.errors < ERRORS_MAX ? null : Status.DISCONNECTED;
+    }
+    entry.errors = 0;
+    return entry.transfer.answered(answer);
   }
 
   #transact({ endpoint, setup, out, data1 }) {
     if (this.#controller.address !== this.#address) return { handshake: Handshake.SILENT };
     if (setup) return { handshake: this.#controller.setup(setup) };
-    return out ? this.#controller.out(endpoint, out, data1) : this.#controller.in(endpoint);
+    if (out) return this.#controller.out(endpoint, out, data1);
+    const error = endpoint !== 0 && this.#controller.ready(endpoint, false) ? this.#busError : null;
+    if (error) this.#busError = null;
+    const answer = this.#controller.in(endpoint, error !== null);
+    if (error === 'fatal') this.#controller.lockUp();
+    return answer;
   }
 
   #finish(entry, status) {
@@ -286,6 +359,7 @@ export class UsbHost {
       this.#busAlarm.cancel();
       this.#onBus = null;
     }
+    if (status === Status.OK && entry.request.type === 'control') this.#noteToggleRestart(entry.request.setup);
     const { done } = entry.request;
     entry.request.done = () => {};
     done(status, entry.transfer && status === Status.OK ? entry.transfer.bytes : new Uint8Array(0));
