@@ -27,6 +27,7 @@ int main(void) {
         usb_poll(!stage_is_armed());
         can_poll();
         stage_poll(link_host_is_there());
+        usb_poll(!stage_is_armed());  // again: a packet a turn would be too few for every trigger of 20 000 slots/s
         if (!link_poll()) board_sleep();
         if (link_is_leaving()) board_enter_bootloader();
     }
