@@ -14,7 +14,8 @@ void board_wake(void);
 // Holds and then releases the reset of peripherals (RESET_ bits).
 void board_release_reset(uint32_t blocks);
 
-// mcp2515.c: from now on IRQ_CAN comes when the controller wants something, or when it is raised.
+// mcp2515.c: from now on IRQ_CAN comes when it is raised; and once by the next fall of the controller's interrupt pin.
+void board_enable_can_interrupt(void);
 void board_watch_can_interrupt(void);
 void board_raise_can_interrupt(void);
 void mcp2515_interrupt(void);

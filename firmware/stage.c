@@ -172,6 +172,7 @@ static bool end_play(enum ols_state ended) {
         latch(stop);
         return false;
     }
+    board_dark();  // first of all
     board_expect_message(0);
     stop_receptor();
     player_stop();
@@ -245,6 +246,7 @@ void stage_poll(bool host_is_there) {
         if (cause != OLS_FAULT_NONE) return end_in_fault(cause);
         if (stop_seen() != OLS_FAULT_NONE) return end_in_fault(stop_seen());
     }
+    if (state == OLS_STATE_WAITING) board_watch_genlock();  // before the look at what it does
     if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
     // A cycle may be over, and the next one waited for, before this turn could see it play.
     if (state == OLS_STATE_WAITING && (edges_seen > 0 || !player_waiting())) begin_play();

@@ -9,6 +9,7 @@ import { hangProgram } from './chip/processor.mjs';
 import { Cause, watchdogLegacy } from './chip/system.mjs';
 import { UsbHost } from './usb/usb_host.mjs';
 
+const TICK_NS = 8;
 const WATCHDOG_SCRATCH4 = 0x4005801c;
 
 export class Board {
@@ -25,6 +26,7 @@ export class Board {
   #resetCause = null; // of a reset that is due
   #can = null;
   #inputs; // levels from outside, by GPIO
+  #oscillators = new Map(); // ticks of half a period, by GPIO
 
   /**
    * @param {object} image from readImage
@@ -137,6 +139,21 @@ export class Board {
     this.#parts.pads.drive(gpio, level);
   }
 
+  /** Something outside makes an input change every `ticks`, for ever. */
+  oscillate(gpio, ticks) {
+    this.#oscillators.set(gpio, Math.max(1, ticks));
+    this.#startOscillator(gpio);
+  }
+
+  #startOscillator(gpio) {
+    const { clock } = this.chip;
+    const change = clock.createAlarm(() => {
+      this.drive(gpio, !this.#inputs.get(gpio));
+      change.schedule(this.#oscillators.get(gpio) * TICK_NS);
+    });
+    change.schedule(this.#oscillators.get(gpio) * TICK_NS);
+  }
+
   unplug() {
     this.usbHost.unplug();
     this.#options.onUnplug();
@@ -156,6 +173,7 @@ export class Board {
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
+    for (const gpio of this.#oscillators.keys()) this.#startOscillator(gpio);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
     if (startsUsbBoot(scratch)) {
