@@ -2,7 +2,7 @@
 // One RP2040 from a reset to the next: rp2040js with the parts that time or the program would notice put right.
 import { RP2040 } from 'rp2040js';
 import { attachBootRom } from './boot_rom.mjs';
-import { correctDma } from './dma.mjs';
+import { Dma } from './dma.mjs';
 import { attachFlash } from './flash.mjs';
 import { Lockstep } from './lockstep.mjs';
 import { Pads } from './pads.mjs';
@@ -12,6 +12,7 @@ import { correctSystem } from './system.mjs';
 import { UsbController } from './usb_controller.mjs';
 
 const PIO_PAGES = [0x50200, 0x50300];
+const DMA_PAGE = 0x50000;
 const USB_PAGE = 0x50110;
 
 /**
@@ -25,6 +26,9 @@ export function buildChip({ naive = false, start, logger, violations }) {
   const chip = new RP2040();
   chip.logger = logger;
   chip.violations = violations;
+  correctProcessor(chip);
+  chip.dma = new Dma(chip);
+  chip.peripherals[DMA_PAGE] = chip.dma;
   const pads = new Pads(time);
   chip.pio = PIO_PAGES.map((page, index) => {
     chip.peripherals[page] = new Pio(chip, { index, pads, time, naive });
@@ -32,8 +36,6 @@ export function buildChip({ naive = false, start, logger, violations }) {
   });
   chip.usbCtrl = new UsbController(chip);
   chip.peripherals[USB_PAGE] = chip.usbCtrl;
-  correctProcessor(chip);
-  correctDma(chip);
   correctSystem(chip, start);
   attachFlash(chip, start.uniqueId);
   attachBootRom(chip);
