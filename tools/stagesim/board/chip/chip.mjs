@@ -8,11 +8,14 @@ import { Lockstep } from './lockstep.mjs';
 import { Pads } from './pads.mjs';
 import { Pio } from './pio.mjs';
 import { correctProcessor } from './processor.mjs';
+import { correctSio } from './sio.mjs';
 import { correctSystem } from './system.mjs';
+import { Timer } from './timer.mjs';
 import { UsbController } from './usb_controller.mjs';
 
 const PIO_PAGES = [0x50200, 0x50300];
 const DMA_PAGE = 0x50000;
+const TIMER_PAGE = 0x40054;
 const USB_PAGE = 0x50110;
 
 /**
@@ -36,6 +39,8 @@ export function buildChip({ naive = false, start, logger, violations }) {
   });
   chip.usbCtrl = new UsbController(chip);
   chip.peripherals[USB_PAGE] = chip.usbCtrl;
+  chip.peripherals[TIMER_PAGE] = new Timer(chip);
+  correctSio(chip, time);
   correctSystem(chip, start);
   attachFlash(chip, start.uniqueId);
   attachBootRom(chip);

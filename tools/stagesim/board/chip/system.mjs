@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The small blocks around the core that rp2040js lacks or gets wrong: resets, the reset cause, the ring oscillator's
-// random bit, the timer's alarms, the watchdog as a reset.
+// random bit, the watchdog as a reset.
 import { BasePeripheral } from 'rp2040js';
 
 const RESETS = 0x4000c;
 const BUSCTRL = 0x40030;
-const TIMER = 0x40054;
 const WATCHDOG = 0x40058;
 const ROSC = 0x40060;
 const VREG_AND_CHIP_RESET = 0x40064;
@@ -22,7 +21,6 @@ export function correctSystem(chip, start) {
   chip.peripherals[ROSC] = new RingOscillator(chip, start.seed);
   chip.peripherals[BUSCTRL].writeUint32 = () => {}; // priorities: nobody contends for the bus here
   correctResets(chip.peripherals[RESETS]);
-  correctTimer(chip.peripherals[TIMER]);
 
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.reason = start.reason;
@@ -44,21 +42,6 @@ export function watchdogLegacy(chip) {
 function correctResets(resets) {
   resets.reset = 0x01ffffff;
   Object.defineProperty(resets, 'reset_done', { get: () => ~resets.reset & 0x01ffffff, set: () => {} });
-}
-
-/** Stock drops the part of a microsecond that has passed, and so fires up to 1 us early. */
-function correctTimer(timer) {
-  const ALARM0 = 0x10;
-  const ALARM3 = 0x1c;
-  const write = timer.writeUint32;
-  timer.writeUint32 = (offset, value) => {
-    write.call(timer, offset, value);
-    if (offset < ALARM0 || offset > ALARM3) return;
-    const now_ns = timer.clock.nanos;
-    const wait_us = (value - Math.floor(now_ns / 1000)) >>> 0;
-    const wait_ns = wait_us * 1000 - (now_ns % 1000);
-    timer.alarms[(offset - ALARM0) / 4].clockAlarm.schedule(Math.max(0, wait_ns));
-  };
 }
 
 /** VREG_AND_CHIP_RESET: only CHIP_RESET's cause bits (datasheet 2.12.7), and the regulator's settings as stored. */
