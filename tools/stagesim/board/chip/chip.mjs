@@ -16,6 +16,8 @@ import { UsbController } from './usb_controller.mjs';
 const PIO_PAGES = [0x50200, 0x50300];
 const DMA_PAGE = 0x50000;
 const TIMER_PAGE = 0x40054;
+const IO_BANK0_PAGE = 0x40014;
+const PADS_BANK0_PAGE = 0x4001c;
 const USB_PAGE = 0x50110;
 
 /**
@@ -45,6 +47,8 @@ export function buildChip({ naive = false, start, logger, violations }) {
   attachFlash(chip, start.uniqueId);
   attachBootRom(chip);
   pads.attach(chip);
+  chip.peripherals[IO_BANK0_PAGE] = pads.ioBank;
+  chip.peripherals[PADS_BANK0_PAGE] = pads.padsBank;
   return { chip, pads, time, lockstep: new Lockstep(chip, pads, time, naive) };
 }
 
