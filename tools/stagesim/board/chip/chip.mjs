@@ -9,6 +9,7 @@ import { Pads } from './pads.mjs';
 import { Pio } from './pio.mjs';
 import { correctProcessor } from './processor.mjs';
 import { correctSio } from './sio.mjs';
+import { Spi } from './spi.mjs';
 import { correctSystem } from './system.mjs';
 import { Timer } from './timer.mjs';
 import { UsbController } from './usb_controller.mjs';
@@ -18,6 +19,7 @@ const DMA_PAGE = 0x50000;
 const TIMER_PAGE = 0x40054;
 const IO_BANK0_PAGE = 0x40014;
 const PADS_BANK0_PAGE = 0x4001c;
+const SPI_PAGES = [0x4003c, 0x40040];
 const USB_PAGE = 0x50110;
 
 /**
@@ -41,6 +43,7 @@ export function buildChip({ naive = false, start, logger, violations }) {
   });
   chip.usbCtrl = new UsbController(chip);
   chip.peripherals[USB_PAGE] = chip.usbCtrl;
+  chip.spi = SPI_PAGES.map((page, index) => (chip.peripherals[page] = new Spi(chip, index)));
   chip.peripherals[TIMER_PAGE] = new Timer(chip);
   correctSio(chip, time);
   correctSystem(chip, start);
