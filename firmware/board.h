@@ -42,6 +42,13 @@ void board_connect_pins(uint8_t inverted_triggers);
 // Bit n: stop input n is low now. That it was, however shortly, is for its handler (interrupts.h).
 uint32_t board_stop_inputs(void);
 
+// From now on the next fall of each stop input is its handler's: one, so that no frequency at these pins takes the processor
+// from anybody. While nothing is guarded nobody wants them.
+void board_watch_stop_inputs(void);
+
+// The next rise of GENLOCK, one, ends board_sleep.
+void board_watch_genlock(void);
+
 // Lets no handler run until board_release_interrupts, which wants what this returned. For some hundred instructions at
 // most: the times of docs/firmware.md, "How each doubt ends dark", reckon with it.
 uint32_t board_hold_interrupts(void);

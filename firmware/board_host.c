@@ -201,6 +201,14 @@ uint32_t board_stop_inputs(void) {
     return board.stop_inputs;
 }
 
+void board_watch_stop_inputs(void) {
+    // board_host_pull_stop_input tells of each fall.
+}
+
+void board_watch_genlock(void) {
+    // Nobody sleeps here.
+}
+
 uint32_t board_hold_interrupts(void) {
     return 0;  // there are none
 }

@@ -34,7 +34,7 @@ static void prepare_dark(uint32_t inverted) {
 }
 
 void board_dark(void) {
-    // Nobody writes SIO's output register: it holds zero from reset on.
+    // What they show is SIO's output register, which init_pins has cleared and nobody sets.
     for (uint32_t n = 0; n < OUTPUT_PINS; n++) *outputs[n].control = outputs[n].dark;
 }
 
@@ -45,6 +45,8 @@ void board_connect_pins(uint8_t inverted_triggers) {
 }
 
 static void init_pins(void) {
+    SIO_GPIO_OUT =
+        0;  // a debugger, or a jump to the reset handler, may leave bits: SIO has no reset of its own in RESETS
     prepare_dark(BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN);
     board_dark();
     for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
@@ -54,10 +56,8 @@ static void init_pins(void) {
     }
     for (uint32_t pin = BOARD_PIN_STOP_INPUTS; pin < BOARD_PIN_STOP_INPUTS + BOARD_STOP_INPUTS; pin++) {
         PAD_GPIO(pin) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
-        REGISTER_SET((uint32_t)&GPIO_INTE(pin)) = GPIO_EDGE_LOW(pin);
     }
     PAD_GPIO(BOARD_PIN_GENLOCK) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
-    REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_GENLOCK)) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);
     PAD_GPIO(BOARD_PIN_PHOTO) = PAD_INPUT | PAD_4MA | PAD_PULL_DOWN;
     GPIO_CTRL(BOARD_PIN_PHOTO) = GPIO_FUNCTION_PIO1 | GPIO_OUTPUT_ALWAYS;
 }
@@ -79,6 +79,21 @@ uint32_t board_stop_inputs(void) {
         if (!(GPIO_STATUS(BOARD_PIN_STOP_INPUTS + n) & GPIO_FROM_PAD)) low |= 1u << n;
     }
     return low;
+}
+
+// Lets an edge of a pin interrupt, once: its handler masks it. What came before is forgotten.
+static void watch_edge(uint32_t pin, uint32_t edge) {
+    GPIO_INTR(pin) = edge;
+    REGISTER_SET((uint32_t)&GPIO_INTE(pin)) = edge;
+}
+
+void board_watch_stop_inputs(void) {
+    for (uint32_t pin = BOARD_PIN_STOP_INPUTS; pin < BOARD_PIN_STOP_INPUTS + BOARD_STOP_INPUTS; pin++)
+        watch_edge(pin, GPIO_EDGE_LOW(pin));
+}
+
+void board_watch_genlock(void) {
+    watch_edge(BOARD_PIN_GENLOCK, GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK));
 }
 
 uint32_t board_hold_interrupts(void) {
@@ -107,8 +122,10 @@ uint64_t board_time_us(void) {
 }
 
 void board_watch_can_interrupt(void) {
-    GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
-    REGISTER_SET((uint32_t)&GPIO_INTE(BOARD_PIN_CAN_INTERRUPT)) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+    watch_edge(BOARD_PIN_CAN_INTERRUPT, GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT));
+}
+
+void board_enable_can_interrupt(void) {
     NVIC_IPR(IRQ_CAN) = NVIC_PRIORITY(IRQ_CAN, 3);
     NVIC_ISER = 1u << IRQ_CAN;
 }

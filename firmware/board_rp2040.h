@@ -18,7 +18,8 @@ static inline void board_wake(void) {
 // The time spent in board_sleep, in all, modulo 2^32.
 uint32_t board_slept_us(void);
 
-// mcp2515.c: from now on IRQ_CAN comes when the controller wants something, or when it is raised.
+// mcp2515.c: from now on IRQ_CAN comes when it is raised; and once by the next fall of the controller's interrupt pin.
+void board_enable_can_interrupt(void);
 void board_watch_can_interrupt(void);
 void board_raise_can_interrupt(void);
 void mcp2515_interrupt(void);

@@ -30,9 +30,10 @@ void cycle_feed_start(const struct cycle_feed* feed) {
 }
 
 void cycle_feed_stop(const struct cycle_feed* feed) {
-    // All disabled first, lest one restarts another during the abort.
+    // All disabled first, and chained to themselves, lest one restarts another during the abort. BUSY tells when that is over
+    // (2.5.5.3); the interrupt that it may raise (erratum RP2040-E13) is nobody's.
     const uint32_t channels[] = {feed->table_channel, feed->count_channel, feed->address_channel};
-    for (int i = 0; i < 3; i++) DMA_AL1_CTRL(channels[i]) = 0;
+    for (int i = 0; i < 3; i++) DMA_AL1_CTRL(channels[i]) = DMA_CTRL_STOPPED(channels[i]);
     for (int i = 0; i < 3; i++) {
         DMA_CHAN_ABORT = 1u << channels[i];
         while (DMA_AL1_CTRL(channels[i]) & DMA_CTRL_BUSY) {

@@ -57,22 +57,32 @@ void interrupt_light(void) {
     board_wake();
 }
 
+// GPIO_EDGE_LOW(n) for stop input n; their pins are in one register, or in two.
+static uint32_t fallen_stop_inputs(void) {
+    enum { FIRST = BOARD_PIN_STOP_INPUTS % 8 };
+    uint32_t fallen = GPIO_INTS(BOARD_PIN_STOP_INPUTS) >> 4 * FIRST;
+    if (FIRST + BOARD_STOP_INPUTS > 8)
+        fallen |= GPIO_INTS(BOARD_PIN_STOP_INPUTS + BOARD_STOP_INPUTS - 1) << 4 * (8 - FIRST) % 32;
+    return fallen;
+}
+
 void interrupt_stop_inputs(void) {
     static const enum ols_fault causes[BOARD_STOP_INPUTS] = {
         [BOARD_EMERGENCY_STOP] = OLS_FAULT_EMERGENCY_STOP,
         [BOARD_OVER_TEMPERATURE] = OLS_FAULT_OVER_TEMPERATURE,
         [BOARD_OPEN_LAMP] = OLS_FAULT_OPEN_LAMP,
     };
+    const uint32_t fallen = fallen_stop_inputs();
     for (uint32_t n = 0; n < BOARD_STOP_INPUTS; n++) {
         const uint32_t pin = BOARD_PIN_STOP_INPUTS + n;
-        if (!(GPIO_INTR(pin) & GPIO_EDGE_LOW(pin))) continue;
-        GPIO_INTR(pin) = GPIO_EDGE_LOW(pin);
+        if (!(fallen & GPIO_EDGE_LOW(n))) continue;
         stop_now(causes[n]);
+        REGISTER_CLEAR((uint32_t)&GPIO_INTE(pin)) = GPIO_EDGE_LOW(pin);  // until stop_guard
     }
-    GPIO_INTR(BOARD_PIN_GENLOCK) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);
-    if (GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) & GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT)) {
-        GPIO_INTR(BOARD_PIN_CAN_INTERRUPT) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
-        board_raise_can_interrupt();
+    REGISTER_CLEAR((uint32_t)&GPIO_INTE(BOARD_PIN_GENLOCK)) = GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK);  // until stage_poll
+    if (GPIO_INTS(BOARD_PIN_CAN_INTERRUPT) & GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT)) {
+        REGISTER_CLEAR((uint32_t)&GPIO_INTE(BOARD_PIN_CAN_INTERRUPT)) = GPIO_EDGE_LOW(BOARD_PIN_CAN_INTERRUPT);
+        board_raise_can_interrupt();  // until it has looked
     }
     board_wake();
 }

@@ -14,7 +14,7 @@ static const struct pio_machine machine = {PIO1_BASE, 1};
 
 void light_watch_allow(uint32_t longest_ticks) {
     // As many steps as the longest light takes, and the one after them raises the flag (pulse.pio).
-    PIO_TXF(PIO1_BASE, machine.machine) = longest_ticks / 2 + longest_ticks % 2;
+    PIO_TXF(PIO1_BASE, machine.machine) = longest_ticks / LIGHT_WATCH_STEP_TICKS;
     pio_execute(machine, PIO_PULL);
     pio_execute(machine, PIO_MOV_Y_OSR);
 }

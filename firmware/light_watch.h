@@ -9,7 +9,7 @@
 // From now on no light may be longer, until the next call. While pins are dark. Loads the PIO program, behind the witness's.
 void light_watch_arm(uint32_t longest_ticks);
 
-// From the next light on, this is the longest. While a program plays.
+// From the next rise of the light on, this is the longest; one that is lit already keeps its own. While a program plays.
 void light_watch_allow(uint32_t longest_ticks);
 
 #endif

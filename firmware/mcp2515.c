@@ -38,6 +38,7 @@ enum {
     SPI_FIFO = 8,
     SEND_BUFFERS = 3,
     TO_SEND_MAX = 32,
+    SERVES_A_TURN = 2 * TO_SEND_MAX,
     RESET_US = 10,  // 128 oscillator cycles after reset (8.1), and RESET low for 2 us (table 13-2)
     GIVE_UP_US = 1000000
 };
@@ -67,6 +68,7 @@ static uint8_t next_buffer = SEND_BUFFERS - 1;
 static volatile bool give_up;
 static volatile uint8_t frames_sent;
 static volatile struct can_bus_health health;
+static volatile uint8_t serves_left;  // until the main loop's next turn
 static uint64_t progress_us;
 static uint8_t progress_sent;
 
@@ -209,9 +211,15 @@ static void serve(void) {
     note_errors(state[0], state[1]);
 }
 
+// However often the pin falls, or if it never rises, the main loop has its turn: it lets the handler serve some more. As
+// many as a working controller can ask for meanwhile: every frame of both rings.
 void mcp2515_interrupt(void) {
     if (give_up) give_up_sending();
-    while (wants_something()) serve();
+    for (; serves_left > 0; serves_left--) {
+        board_watch_can_interrupt();  // before the look, so that no fall is between them
+        if (!wants_something()) break;
+        serve();
+    }
     send_queued();
     board_wake();
 }
@@ -284,6 +292,8 @@ bool can_bus_init(unsigned board_number) {
         return false;
     }
     configure(board_number);
+    serves_left = SERVES_A_TURN;
+    board_enable_can_interrupt();
     board_watch_can_interrupt();
     return true;
 }
@@ -312,6 +322,9 @@ bool can_bus_is_idle(void) {
 }
 
 void can_bus_poll(uint64_t now_us) {
+    const bool was_cut_short = present && serves_left == 0;
+    serves_left = SERVES_A_TURN;
+    if (was_cut_short) board_raise_can_interrupt();
     if (can_bus_is_idle() || frames_sent != progress_sent || give_up) {
         progress_sent = frames_sent;
         progress_us = now_us;

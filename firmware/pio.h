@@ -34,7 +34,9 @@ static inline void pio_set_scratch(struct pio_machine m, uint32_t value, uint32_
 // Stops the machine, empties its FIFOs (changing FJOIN does, datasheet 3.7 SM0_SHIFTCTRL) and forgets its state.
 static inline void pio_stop(struct pio_machine m, uint32_t shift_control) {
     REGISTER_CLEAR(PIO_CTRL(m.block)) = PIO_CTRL_ENABLE(m.machine);
-    PIO_SM_SHIFTCTRL(m.block, m.machine) = shift_control ^ PIO_SHIFT_JOIN_RX ^ PIO_SHIFT_JOIN_TX;
+    // The other way of one join, never both joined: neither FIFO would have room.
+    PIO_SM_SHIFTCTRL(m.block, m.machine) =
+        shift_control ^ (shift_control & PIO_SHIFT_JOIN_RX ? PIO_SHIFT_JOIN_RX : PIO_SHIFT_JOIN_TX);
     PIO_SM_SHIFTCTRL(m.block, m.machine) = shift_control;
     REGISTER_SET(PIO_CTRL(m.block)) = PIO_CTRL_RESTART(m.machine);
 }

@@ -43,8 +43,9 @@ static const struct sequence* playing;
 static enum ols_start_source started_by;
 static uint32_t playing_from;        // cycle of the feeds, since arm, in which `playing` began
 static uint32_t begun;               // cycles begun by the feed that is ahead, since arm
-static const struct sequence* next;  // follows from cycle next_from on; null when no swap is under way
+static const struct sequence* next;  // follows from cycle next_from on; null when the ring has no cycle of another
 static uint32_t next_from;
+static bool entering;  // from player_swap until the timeline has taken the next one's first word
 
 void player_init(void) {
     static const uint16_t timeline_program[] = TIMELINE_PROGRAM;
@@ -144,20 +145,31 @@ static void count_cycles(void) {
     begun += timeline_new > shifter_new ? timeline_new : shifter_new;
 }
 
-// From what DMA has copied less what the FIFO still holds, read until nothing was copied in between; each read takes longer
-// than DMA does from a word's read to its write.
+struct progress {
+    uint32_t cycles;     // whose table the timeline's feed has begun, since arm
+    uint32_t next_word;  // address of the one that it copies next
+    uint32_t queued;     // words that the FIFO still holds
+};
+
+// Read until nothing was copied in between; each read takes longer than DMA does from a word's read to its write.
+static struct progress timeline_progress(void) {
+    struct progress now;
+    do {
+        now.next_word = cycle_feed_next_word(&timeline_feed);
+        count_cycles();
+        now.cycles = begun - (begun - cycle_feed_begun(&timeline_feed)) % CYCLE_FEED_RING;
+        now.queued = PIO_TX_LEVEL(PIO0_BASE, timeline.machine);
+    } while (now.next_word != cycle_feed_next_word(&timeline_feed));
+    return now;
+}
+
+// From what DMA has copied less what the FIFO still holds.
 uint32_t player_cycles_begun(void) {
     const uint32_t cycle_words = playing->cycle_words + 1;  // with the wait for the next cycle's edge
-    uint32_t fed, next_word, queued;
-    do {
-        next_word = cycle_feed_next_word(&timeline_feed);
-        count_cycles();
-        fed = begun - (begun - cycle_feed_begun(&timeline_feed)) % CYCLE_FEED_RING;
-        queued = PIO_TX_LEVEL(PIO0_BASE, timeline.machine);
-    } while (next_word != cycle_feed_next_word(&timeline_feed));
+    const struct progress now = timeline_progress();
     // Of the cycles that are fed, those have not begun of which no word has been taken from the FIFO.
-    const uint32_t to_come = cycle_words - (next_word - (uint32_t)(sequence_enter(playing) + 1)) / 4;
-    return fed - (to_come + queued) / cycle_words;
+    const uint32_t to_come = cycle_words - (now.next_word - (uint32_t)(sequence_enter(playing) + 1)) / 4;
+    return now.cycles - (to_come + now.queued) / cycle_words;
 }
 
 static bool feed_is_past(const struct cycle_feed* feed, uint32_t cycle) {
@@ -181,25 +193,40 @@ bool player_swap(const struct sequence* following, uint32_t* after_cycles) {
     board_release_interrupts(held);
     if (!in_time) return false;
     next = following;
+    entering = true;
     next_from = last + 1;
     set_cycles(following, next_from + 1, next_from + RING_USED);
     return true;
 }
 
 bool player_swapping(void) {
-    return next != NULL;
+    return next != NULL || entering;
 }
 
-void player_poll(void) {
-    count_cycles();
-    if (next == NULL || begun - next_from > RING_USED || !feed_is_past(&timeline_feed, next_from) ||
+// Both feeds are in the new program: what is left in the ring of the old one is not to come round again.
+static void fill_ring(void) {
+    if (begun - next_from > RING_USED || !feed_is_past(&timeline_feed, next_from) ||
         !feed_is_past(&shifter_feed, next_from))
         return;
-    // Both are in the new program: what is left in the ring of the old one is not to come round again.
     set_cycles(next, next_from + RING_USED, next_from + CYCLE_FEED_RING + 1);
     playing = next;
     playing_from = next_from;
     next = NULL;
+}
+
+// The first word of `playing` enters it, and comes after the last light and trigger of the program before: while that word
+// is queued those may be queued, too, or be at the pins. Of the words copied since, the FIFO holds the last.
+static bool has_entered(void) {
+    const struct progress now = timeline_progress();
+    const uint32_t copied = (now.cycles - 1 - playing_from) * playing->cycle_words +
+                            (now.next_word - (uint32_t)sequence_enter(playing)) / 4;
+    return copied > now.queued;
+}
+
+void player_poll(void) {
+    count_cycles();
+    if (next != NULL) fill_ring();
+    if (entering && next == NULL) entering = !has_entered();
 }
 
 uint32_t player_events(void) {
@@ -209,6 +236,7 @@ uint32_t player_events(void) {
 void player_stop(void) {
     board_dark();
     next = NULL;
+    entering = false;
     cycle_feed_stop(&timeline_feed);
     cycle_feed_stop(&shifter_feed);
     pio_stop(timeline, TIMELINE_SHIFT_CONTROL);

@@ -36,10 +36,11 @@ bool player_waiting(void);
 // player_stop. False, and nothing changes, when the playing sequence ends before that.
 bool player_swap(const struct sequence* following, uint32_t* after_cycles);
 
-// True until the sequence before the swap is no longer needed.
+// True until the sequence before the swap is no longer needed: all of its lights and triggers are over, not only on their
+// way to the FIFO.
 bool player_swapping(void);
 
-// Once each turn of the main loop, and at least every 2.4 ms while playing: 240 of the shortest cycles.
+// Once each turn of the main loop and now and then in it, for at least every 2.4 ms while playing: 240 of the shortest cycles.
 void player_poll(void);
 
 // What has happened since player_arm, enum player_event bits.

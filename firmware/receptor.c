@@ -26,7 +26,7 @@ void receptor_init(void) {
 void receptor_stop(void) {
     pio_stop(machine, 0);
     pio_execute(machine, PIO_MOV_PINS_NULL);
-    DMA_AL1_CTRL(CHANNEL) = 0;
+    DMA_AL1_CTRL(CHANNEL) = DMA_CTRL_STOPPED(CHANNEL);
     DMA_CHAN_ABORT = 1u << CHANNEL;
     while (DMA_AL1_CTRL(CHANNEL) & DMA_CTRL_BUSY) {
     }

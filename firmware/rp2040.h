@@ -107,6 +107,7 @@ enum { WATCHDOG_ENABLE = 1 << 30, WATCHDOG_TICK_ENABLE = 1 << 9, WATCHDOG_COUNTS
 // Edges of inputs, eight pins a register, four bits each: write an edge's bit to clear it
 #define GPIO_INTR(pin) REGISTER(0x400140f0 + 4 * ((pin) / 8))
 #define GPIO_INTE(pin) REGISTER(0x40014100 + 4 * ((pin) / 8))  // of processor 0
+#define GPIO_INTS(pin) REGISTER(0x40014120 + 4 * ((pin) / 8))  // what has come of those enabled
 #define GPIO_EDGE_LOW(pin) (4u << 4 * ((pin) % 8))
 #define GPIO_EDGE_HIGH(pin) (8u << 4 * ((pin) % 8))
 enum {
@@ -206,6 +207,7 @@ enum {
 #define DMA_AL1_CTRL(channel) REGISTER(0x50000010 + 0x40 * (channel))
 #define DMA_AL3_READ_ADDR_TRIG(channel) REGISTER(0x5000003c + 0x40 * (channel))
 #define DMA_CHAN_ABORT REGISTER(0x50000444)
+#define DMA_CTRL_STOPPED(channel) DMA_CTRL_CHAIN_TO(channel)  // of its own number: to none
 #define DMA_CTRL_CHAIN_TO(channel) ((uint32_t)(channel) << 11)
 #define DMA_CTRL_PACE(request) ((uint32_t)(request) << 15)
 #define DMA_CTRL_READ_RING(bits) ((uint32_t)(bits) << 6)
@@ -286,7 +288,8 @@ enum {
     USB_BUFFER_BYTES = 0x3ff
 };
 
-// Single-cycle IO: the divider, done 8 cycles after the divisor is written (2.3.1.5)
+// Single-cycle IO: output levels (2.3.1.2); the divider, done 8 cycles after the divisor is written (2.3.1.5)
+#define SIO_GPIO_OUT REGISTER(0xd0000010)
 #define SIO_DIV_UDIVIDEND REGISTER(0xd0000060)
 #define SIO_DIV_UDIVISOR REGISTER(0xd0000064)
 #define SIO_DIV_QUOTIENT REGISTER(0xd0000070)

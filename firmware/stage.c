@@ -19,6 +19,7 @@
 #include "witness.h"
 
 enum { CHECKED_BYTES_A_TURN = 4096, RECHECKED_BYTES_A_TURN = 256 };
+enum { STAMPS_A_LOOK = 16 };  // the log takes 8 us for a trigger, so that a hundred of them keep the player waiting
 
 static enum ols_state state;
 static struct sequence sequences[2];
@@ -138,8 +139,10 @@ static bool read_witness(void) {
         stamps_read = seen - WITNESS_RING_STAMPS;
     }
     const uint64_t now_ticks = ticks_since_start();
-    while (stamps_read != seen)
+    while (stamps_read != seen) {
+        if (stamps_read % STAMPS_A_LOOK == 0) player_poll();
         if (!trigger_log_add(witness_stamp(stamps_read++), now_ticks)) return false;
+    }
     return true;
 }
 
@@ -169,6 +172,7 @@ static bool end_play(enum ols_state ended) {
         latch(stop);
         return false;
     }
+    board_dark();  // first of all
     board_expect_message(0);
     stop_receptor();
     player_stop();
@@ -186,6 +190,8 @@ static bool words_stay_good(void) {
     return good;
 }
 
+// All of the old program has been played, and its triggers are in the log: its slots may be overwritten. From the next
+// light on the new program's limit holds.
 static void end_swap(void) {
     take_next();
     schedule_settle();
@@ -195,6 +201,9 @@ static void end_swap(void) {
 static void follow_play(void) {
     // Events first: when all cycles are played, all triggers have fired.
     const uint32_t events = player_events();
+    // Likewise: what has been entered was entered after the old program's last trigger.
+    player_poll();
+    const bool swap_is_over = next == OLS_NEXT_SWAPPING && !player_swapping();
     const bool on_time = read_witness();
     if (events & PLAYER_TIMELINE_STARVED) return end_in_fault(OLS_FAULT_TIMELINE_STARVED);
     if (events & PLAYER_SHIFTER_STARVED) return end_in_fault(OLS_FAULT_SHIFTER_STARVED);
@@ -207,8 +216,7 @@ static void follow_play(void) {
         cycle_digest_end(state == OLS_STATE_DONE);
         return;
     }
-    player_poll();
-    if (next == OLS_NEXT_SWAPPING && !player_swapping()) end_swap();
+    if (swap_is_over) end_swap();
     fault_note_progress(trigger_log_slot(), ticks_since_start());
 }
 
@@ -238,6 +246,7 @@ void stage_poll(bool host_is_there) {
         if (cause != OLS_FAULT_NONE) return end_in_fault(cause);
         if (stop_seen() != OLS_FAULT_NONE) return end_in_fault(stop_seen());
     }
+    if (state == OLS_STATE_WAITING) board_watch_genlock();  // before the look at what it does
     if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
     // A cycle may be over, and the next one waited for, before this turn could see it play.
     if (state == OLS_STATE_WAITING && (edges_seen > 0 || !player_waiting())) begin_play();

@@ -14,6 +14,7 @@ static volatile struct stop first;
 void stop_guard(void) {
     first.cause = OLS_FAULT_NONE;
     guarding = true;
+    board_watch_stop_inputs();
 }
 
 struct stop stop_unguard(void) {

@@ -26,7 +26,7 @@ void witness_init(void) {
 void witness_arm(enum ols_start_source start) {
     TIMER_ARMED = 1u << BOARD_ALARM_TRIGGER;  // of the run before
     PIO_IRQ(PIO1_BASE) = 1u << WITNESS_STAMPED;
-    DMA_AL1_CTRL(CHANNEL) = 0;
+    DMA_AL1_CTRL(CHANNEL) = DMA_CTRL_STOPPED(CHANNEL);
     DMA_CHAN_ABORT = 1u << CHANNEL;
     while (DMA_AL1_CTRL(CHANNEL) & DMA_CTRL_BUSY) {
     }

@@ -16,6 +16,28 @@ def one_slot_program(cycles, period_ticks, lamp):
                        "bits": bits}]}
 
 
+def light_program(light_ticks, cycles=0, grey=False, offset_ticks=0, triggers=1):
+    """Three slots a cycle, lit for about `light_ticks`, at most 70 % of the time; grey: the longest plane is."""
+    slot = {"kind": wire.BASIS, "trigger_mask": triggers, "trigger_offset_ticks": offset_ticks,
+            "exposure_ticks": light_ticks, "period_ticks": max(light_ticks * 10 // 7, light_ticks + 2600),
+            "bits": [int(n < 100) for n in range(CHAIN_BITS)]}
+    if grey:
+        unit_ticks = light_ticks // 4
+        slot |= {"planes": 3, "exposure_ticks": 7 * unit_ticks, "period_ticks": 7 * unit_ticks * 3 // 2 + 6000,
+                 "levels": [n % 8 if n < 100 else 0 for n in range(CHAIN_BITS)]}
+    return {"cycles": cycles, "chain_bits": CHAIN_BITS, "slots": [dict(slot) for _ in range(3)],
+            "triggers": [{}], "lead_ticks": 1000 if offset_ticks < 0 else 0}
+
+
+def swap_to(link, program):
+    """Loads the program, lets it follow and waits until it has; returns after how many cycles it did."""
+    link.load(program)
+    after, _ = link.swap()
+    while link.status()["next"] == wire.NEXT_SWAPPING:
+        pass
+    return after
+
+
 def joined(programs_and_cycles):
     """What was played, as one program for the checker."""
     slots = [slot for program, cycles in programs_and_cycles for _ in range(cycles) for slot in program["slots"]]
@@ -77,6 +99,44 @@ def test_the_shortest_cycles_are_swapped_without_a_gap_again_and_again(emulated)
     report = check_trace.own_check(check_trace.read_vcd(board.trace), check_trace.expected_slots([whole]))
     wrong = {name: report[name] for name in report if name.endswith(("_wrong", "_error_ticks")) and report[name]}
     assert not wrong and report["triggers"] == len(whole["slots"]) > 600
+
+
+@pytest.mark.parametrize("options", [{}, {"grey": True}, {"offset_ticks": -700}, {"offset_ticks": 1500}, {"triggers": 0}],
+                         ids=["plain", "grey", "early triggers", "late triggers", "no triggers"])
+def test_lights_may_become_shorter_and_longer_from_program_to_program(emulated, options):
+    link = emulated().plug()
+    programs = [light_program(us * 125, **options) for us in (400, 40, 24)]
+    link.play(programs[0])
+    for following in (programs[1], programs[2], programs[0], programs[2], programs[0]) * 3:
+        swap_to(link, following)
+        status = link.status()
+        assert status["fault"] == 0, wire.FAULTS[status["fault"]]
+
+
+def test_a_dark_program_may_be_followed_by_one_with_lights(emulated):
+    link = emulated().plug()
+    dark = light_program(5000)
+    for slot in dark["slots"]:
+        slot |= {"kind": wire.DARK, "bits": [0] * CHAIN_BITS}
+    link.play(dark)
+    for following in (light_program(50_000), dark, light_program(3000), dark, light_program(50_000)):
+        swap_to(link, following)
+        status = link.status()
+        assert status["fault"] == 0, wire.FAULTS[status["fault"]]
+
+
+def test_after_a_swap_to_shorter_lights_one_that_is_longer_than_those_is_caught(emulated):
+    board = emulated("--inject", "upset:17@trigger:1000+1000", trace=True)
+    link = board.plug()
+    link.play(light_program(50_000))
+    swap_to(link, light_program(3000))
+    status = link.wait_until([wire.FAULT])
+    assert wire.FAULTS[status["fault"]] == "over-duty"
+    board.stop()
+    lights = check_trace.pulses(check_trace.read_vcd(board.trace), "LIGHT_EN")
+    # The upset adds 2^17 ticks to the light; the handler has 10 us (docs/firmware.md, "How each doubt ends dark").
+    assert 3000 < lights[-1][1] - lights[-1][0] < 3000 + 6 + 1250
+    assert max(fall - rise for rise, fall in lights[-100:-1]) == 3000
 
 
 def test_1024_slots_are_loaded_while_1024_play(emulated):

@@ -57,7 +57,7 @@ def test_every_register_of_the_table_is_the_vendors_with_the_same_place_and_the_
         base, vendor = vendor_registers(peripherals, name)
         # The table's base of the PPB is that of its registers' page.
         shift = block["base"] - base
-        for register, (offset, mask) in block["registers"].items():
+        for register, (offset, mask, *_) in block["registers"].items():
             checked += 1
             place, bits = vendor.get(register, (None, None))
             different = DIFFERENT.get((name, register), 0)

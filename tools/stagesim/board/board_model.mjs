@@ -8,6 +8,7 @@ import { hangProgram, lockUp } from './chip/processor.mjs';
 import { Cause, watchdogLegacy } from './chip/system.mjs';
 import { UsbHost } from './usb/usb_host.mjs';
 
+const TICK_NS = 8;
 const TICKS_PER_US = 125;
 
 export class Board {
@@ -24,6 +25,7 @@ export class Board {
   #can = null;
   #inputs; // levels from outside, by GPIO
   #boot; // ticks since the last reset at which what was reached first, and why it began
+  #oscillators = new Map(); // ticks of half a period, by GPIO
 
   /**
    * @param {object} image from readImage
@@ -148,6 +150,21 @@ export class Board {
     this.#parts.pads.drive(gpio, level);
   }
 
+  /** Something outside makes an input change every `ticks`, for ever. */
+  oscillate(gpio, ticks) {
+    this.#oscillators.set(gpio, Math.max(1, ticks));
+    this.#startOscillator(gpio);
+  }
+
+  #startOscillator(gpio) {
+    const { clock } = this.chip;
+    const change = clock.createAlarm(() => {
+      this.drive(gpio, !this.#inputs.get(gpio));
+      change.schedule(this.#oscillators.get(gpio) * TICK_NS);
+    });
+    change.schedule(this.#oscillators.get(gpio) * TICK_NS);
+  }
+
   unplug() {
     this.usbHost.unplug();
     this.#options.onUnplug();
@@ -172,6 +189,7 @@ export class Board {
     this.#boot = { cause, driven: null, attached: null };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.chip.usbCtrl.busyHub = this.#options.busyHub ?? false;
+    for (const gpio of this.#oscillators.keys()) this.#startOscillator(gpio);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
   }

@@ -27,10 +27,15 @@ const FAULTS = {
   openlamp: (board) => board.drive(board.pins.stopInputs.OPEN_LAMP, false),
   genlock: (board) => board.drive(board.pins.genlock, true),
   genlockfall: (board) => board.drive(board.pins.genlock, false),
+  genlockclock: (board, ticks) => board.oscillate(board.pins.genlock, ticks),
+  openlampclock: (board, ticks) => board.oscillate(board.pins.stopInputs.OPEN_LAMP, ticks),
+  canclock: (board, ticks) => board.oscillate(board.pins.can.pins.CAN_INTERRUPT, ticks),
   release: (board) => Object.values(board.pins.stopInputs).forEach((gpio) => board.drive(gpio, true)),
 };
 /** How many numbers a fault takes, at least and at most, and what each must be below; none where it is not here. */
 const NUMBERS = { starve: { least: 0, below: [12] }, upset: { least: 1, below: [32] },
+                  genlockclock: { least: 1, below: [1e9] }, openlampclock: { least: 1, below: [1e9] },
+                  canclock: { least: 1, below: [1e9] },
                   flip: { least: 2, below: [0x20042000, 8] } };
 
 /**

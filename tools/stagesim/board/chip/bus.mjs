@@ -76,7 +76,7 @@ export class Bus {
 
   #add(block) {
     const registers = [];
-    for (const [name, [offset, bits]] of Object.entries(block.registers)) registers[offset >> 2] = { name, bits };
+    for (const [name, [offset, bits, writeOnly]] of Object.entries(block.registers)) registers[offset >> 2] = { name, bits, writeOnly };
     this.#blocks.set(Math.floor(block.base / BLOCK_BYTES), { ...block, registers, known: registers.length > 0 });
   }
 
@@ -101,7 +101,9 @@ export class Bus {
     const block = this.#blockAt(address, 'read');
     const alias = this.#aliasOf(block, address);
     if (alias !== 0) this.#violations.note('2.1.2', `a read${ALIASES[alias]} of ${block.name}: aliases are for writes`);
-    if (!this.#register(block, address, 'read')) return 0;
+    const register = this.#register(block, address, 'read');
+    if (!register) return 0;
+    if (register.writeOnly) this.#violations.note(block.section, `${block.name} ${register.name} is read, and is write only`);
     return this.#peripheral(block, address).readUint32(offsetOf(block, address)) >>> 0;
   }
 

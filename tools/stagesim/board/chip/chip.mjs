@@ -4,7 +4,7 @@ import { RP2040 } from 'rp2040js';
 import { attachBootRom, bootRom } from './boot_rom.mjs';
 import { Bus } from './bus.mjs';
 import { Clocks } from './clocks.mjs';
-import { correctDma } from './dma.mjs';
+import { Dma } from './dma.mjs';
 import { Lockstep } from './lockstep.mjs';
 import { CrystalOscillator, Pll } from './oscillators.mjs';
 import { Pads } from './pads.mjs';
@@ -14,15 +14,18 @@ import { QspiPins } from './qspi_pins.mjs';
 import { Resets } from './resets.mjs';
 import { Ssi } from './ssi.mjs';
 import { StoredRegisters } from './stored_registers.mjs';
+import { correctSio } from './sio.mjs';
+import { Spi } from './spi.mjs';
 import { revisionOf, SysInfo } from './sysinfo.mjs';
-import { ChipReset, correctTimer, RingOscillator } from './system.mjs';
+import { ChipReset, RingOscillator } from './system.mjs';
+import { Timer } from './timer.mjs';
 import { UsbController } from './usb_controller.mjs';
 import { Watchdog } from './watchdog.mjs';
 import { Xip, XipControl } from './xip.mjs';
 
-const PAGES = { XIP_CTRL: 0x14000, XIP_SSI: 0x18000, SYSINFO: 0x40000, CLOCKS: 0x40008, RESETS: 0x4000c, PSM: 0x40010, IO_QSPI: 0x40018,
-                PADS_QSPI: 0x40020, XOSC: 0x40024, PLL_SYS: 0x40028, PLL_USB: 0x4002c, BUSCTRL: 0x40030, TIMER: 0x40054,
-                WATCHDOG: 0x40058, ROSC: 0x40060, VREG_AND_CHIP_RESET: 0x40064, USBCTRL: 0x50110, PIO0: 0x50200, PIO1: 0x50300 };
+const PAGES = { XIP_CTRL: 0x14000, XIP_SSI: 0x18000, SYSINFO: 0x40000, CLOCKS: 0x40008, RESETS: 0x4000c, PSM: 0x40010, IO_BANK0: 0x40014,
+                IO_QSPI: 0x40018, PADS_BANK0: 0x4001c, PADS_QSPI: 0x40020, XOSC: 0x40024, PLL_SYS: 0x40028, PLL_USB: 0x4002c, BUSCTRL: 0x40030, SPI0: 0x4003c, SPI1: 0x40040, TIMER: 0x40054,
+                WATCHDOG: 0x40058, ROSC: 0x40060, VREG_AND_CHIP_RESET: 0x40064, DMA: 0x50000, USBCTRL: 0x50110, PIO0: 0x50200, PIO1: 0x50300 };
 export const ROSC_HZ = 6_500_000; // 2.17.1; 1.8 to 12 MHz over chips, voltage and temperature
 export const CRYSTAL_MS = 6; // that a Pico's crystal takes to swing; others take longer
 
@@ -45,11 +48,13 @@ export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, cryst
   const chip = new RP2040();
   chip.logger = strictLogger(violations);
   chip.violations = violations;
+  correctProcessor(chip);
   const pads = new Pads(time);
   const put = (name, peripheral) => {
     chip.peripherals[PAGES[name]] = peripheral;
     return peripheral;
   };
+  chip.dma = put('DMA', new Dma(chip));
   chip.pio = [0, 1].map((index) => put(`PIO${index}`, new Pio(chip, { index, pads, time, naive })));
   const revision = revisionOf(stepping);
   put('SYSINFO', new SysInfo(chip, revision));
@@ -62,11 +67,13 @@ export function buildChip({ naive = false, start, flash, roscHz = ROSC_HZ, cryst
   put('PSM', new StoredRegisters(chip, 'PSM'));
   put('BUSCTRL', new StoredRegisters(chip, 'BUSCTRL', { 0x4: 1 })); // nobody contends for the bus here
   put('VREG_AND_CHIP_RESET', new ChipReset(chip, start.cause));
-  correctTimer(chip.peripherals[PAGES.TIMER]);
-  correctProcessor(chip);
-  correctDma(chip);
+  chip.spi = [0, 1].map((index) => put(`SPI${index}`, new Spi(chip, index)));
+  put('TIMER', new Timer(chip));
+  correctSio(chip, time);
   attachBootRom(chip);
   pads.attach(chip);
+  put('IO_BANK0', pads.ioBank);
+  put('PADS_BANK0', pads.padsBank);
   new Bus(chip, { resets, xip, clocks, watchdog: chip.peripherals[PAGES.WATCHDOG] });
   const lockstep = new Lockstep(chip, pads, time, clocks, naive);
   chip.core.waiting = true;

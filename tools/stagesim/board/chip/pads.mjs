@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The pads of GPIO 0..29: who drives each, and what the inputs see of it after the synchroniser
 // (RP2040 datasheet 2.19). An output pad reads itself back, as real pads do.
+import { IoBank, PadsBank } from './io_bank.mjs';
 
 const GPIO_COUNT = 30;
+const OVERRIDES = [null, 'invert', 'low', 'high'];
 const FUNCTION_SIO = 5;
 const FUNCTION_PIO0 = 6;
 const FUNCTION_PIO1 = 7;
-const PAD_RESET = 0x56; // datasheet 2.19.6.3: input enabled, pulled down, Schmitt trigger, 4 mA
 const SYNCHRONISER_CYCLES = 2; // two flip-flops (datasheet 3.5.6.3)
 
 /**
@@ -17,10 +18,9 @@ export class Pads {
   #time;
   #chip;
   #sources = { sio: 0, pio0: 0, pio1: 0 };
-  #overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0 };
+  #overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0, turn: 0 };
   #enabledInputs = 0;
-  #invertedInputs = 0;
-  #forcedInputs = 0;
+  #inputOverrides = { invert: 0, low: 0, high: 0 };
   #pulledUp = 0;
   #externalMask = 0;
   #externalLevels = 0;
@@ -40,17 +40,51 @@ export class Pads {
   attach(chip) {
     this.#chip = chip;
     for (const pin of chip.gpio) {
-      pin.padValue = PAD_RESET;
-      pin.checkForUpdates = () => {
-        this.#configure();
-        this.update(this.#time.cycle + 1);
-      };
+      pin.checkForUpdates = () => this.configure();
       const { index } = pin;
       Object.defineProperty(pin, 'inputValue', { get: () => this.seen(index, this.#time.cycle, 0) });
       Object.defineProperty(pin, 'rawInputValue', { get: () => ((this.levels >> index) & 1) === 1, set: () => {} });
     }
     Object.defineProperty(chip, 'gpioValues', { get: () => this.seenAll(this.#time.cycle, 0) });
+    this.ioBank = new IoBank(chip, this);
+    this.padsBank = new PadsBank(chip, this);
+    this.padsBank.reset();
+    this.ioBank.reset();
+  }
+
+  /** The control registers have changed. */
+  configure() {
     this.#configure();
+    this.update(this.#time.cycle + 1);
+  }
+
+  /** Levels of the inputs that are enabled, overridden, before the synchroniser. */
+  get inputs() {
+    return this.#history[0].inputs;
+  }
+
+  /** GPIOx_STATUS (2.19.6.1): what the peripheral gives and the pad gets, and what the pad gives and the peripheral gets. */
+  status(gpio) {
+    const bit = (bits, place) => (((bits >> gpio) & 1) << place);
+    const { out, driven } = this.#peripherals();
+    const [toPad, enabled] = this.#override(out, driven);
+    const irq = ((this.ioBank.readUint32(0x120 + 4 * (gpio >> 3)) >>> (4 * (gpio & 7))) & 0xf) !== 0;
+    return bit(out, 8) | bit(toPad, 9) | bit(driven, 12) | bit(enabled, 13) | bit(this.levels & this.#enabledInputs, 17) |
+      bit(this.inputs, 19) | (irq ? (1 << 24) | (1 << 26) : 0);
+  }
+
+  #peripherals() {
+    const { pio: [pio0, pio1], sio } = this.#chip;
+    const sources = this.#sources;
+    return {
+      out: (pio0.pinValues & sources.pio0) | (pio1.pinValues & sources.pio1) | (sio.gpioValue & sources.sio),
+      driven: (pio0.pinDirections & sources.pio0) | (pio1.pinDirections & sources.pio1) | (sio.gpioOutputEnable & sources.sio),
+    };
+  }
+
+  #override(out, driven) {
+    const { invert, low, high, turn, enable, disable } = this.#overrides;
+    return [((out ^ invert) & ~low) | high, ((driven ^ turn) | enable) & ~disable];
   }
 
   /** Drives a pad from outside the chip; null lets go of it. An output of the chip wins. */
@@ -89,20 +123,15 @@ export class Pads {
 
   /** Works out the pads' levels from `cycle` on. Call after anything that drives them has changed. */
   update(cycle) {
-    const { pio, sio } = this.#chip;
-    const [pio0, pio1] = pio;
-    const sources = this.#sources;
-    const overrides = this.#overrides;
+    const [pio0, pio1] = this.#chip.pio;
     pio0.pinsChanged = false;
     pio1.pinsChanged = false;
-    let out = (pio0.pinValues & sources.pio0) | (pio1.pinValues & sources.pio1) | (sio.gpioValue & sources.sio);
-    let driven = (pio0.pinDirections & sources.pio0) | (pio1.pinDirections & sources.pio1) |
-      (sio.gpioOutputEnable & sources.sio);
-    out = ((out ^ overrides.invert) & ~overrides.low) | overrides.high;
-    driven = (driven | overrides.enable) & ~overrides.disable;
+    const made = this.#peripherals();
+    const [out, driven] = this.#override(made.out, made.driven);
     const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
     const levels = (out & driven) | (idle & ~driven);
-    const inputs = ((levels & this.#enabledInputs) ^ this.#invertedInputs) | this.#forcedInputs;
+    const { invert, low, high } = this.#inputOverrides;
+    const inputs = (((levels & this.#enabledInputs) ^ invert) & ~low) | high;
     if (inputs !== this.#history[0].inputs) this.#inputsChange(cycle, inputs);
     if (levels === this.levels && driven === this.driven) return;
     this.levels = levels;
@@ -129,19 +158,15 @@ export class Pads {
       if (early) pio.inputsChanged(early, cycle);
       if (early !== changed) pio.inputsChanged(changed & ~early, cycle + SYNCHRONISER_CYCLES);
     }
-    for (let rest = changed; rest !== 0; rest &= rest - 1) {
-      const pin = this.#chip.gpio[31 - Math.clz32(rest & -rest)];
-      if (pin.irqEnableMask) pin.setInputValue(((inputs >> pin.index) & 1) === 1);
-    }
+    this.ioBank.inputsChanged(changed & inputs, changed & ~inputs);
   }
 
   /** Reads IO_BANK0 and PADS_BANK0 anew: function select, overrides, input enable, pull-ups. */
   #configure() {
     const sources = { sio: 0, pio0: 0, pio1: 0 };
-    const overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0 };
+    const overrides = { invert: 0, low: 0, high: 0, enable: 0, disable: 0, turn: 0 };
+    const inputOverrides = { invert: 0, low: 0, high: 0 };
     let enabledInputs = 0;
-    let invertedInputs = 0;
-    let forcedInputs = 0;
     let pulledUp = 0;
     for (let n = 0; n < GPIO_COUNT; n++) {
       const bit = 1 << n;
@@ -149,22 +174,20 @@ export class Pads {
       if (pin.functionSelect === FUNCTION_SIO) sources.sio |= bit;
       if (pin.functionSelect === FUNCTION_PIO0) sources.pio0 |= bit;
       if (pin.functionSelect === FUNCTION_PIO1) sources.pio1 |= bit;
-      const outKind = [null, 'invert', 'low', 'high'][pin.outputOverride];
+      const outKind = OVERRIDES[pin.outputOverride];
       if (outKind) overrides[outKind] |= bit;
-      if (pin.outputEnableOverride === 1) throw new Error(`GPIO ${n}: an inverted output enable is not modelled`);
+      if (pin.outputEnableOverride === 1) overrides.turn |= bit;
       if (pin.outputEnableOverride === 2 || pin.outputDisable) overrides.disable |= bit;
       if (pin.outputEnableOverride === 3) overrides.enable |= bit;
       if (pin.inputEnable) enabledInputs |= bit;
-      if (pin.inputOverride === 2) throw new Error(`GPIO ${n}: inputs forced low are not modelled`);
-      if (pin.inputOverride === 3) forcedInputs |= bit;
-      if (pin.inputOverride === 1) invertedInputs |= bit;
+      const inKind = OVERRIDES[pin.inputOverride];
+      if (inKind) inputOverrides[inKind] |= bit;
       if (pin.pullupEnabled) pulledUp |= bit;
     }
     this.#sources = sources;
     this.#overrides = overrides;
     this.#enabledInputs = enabledInputs;
-    this.#invertedInputs = invertedInputs;
-    this.#forcedInputs = forcedInputs;
+    this.#inputOverrides = inputOverrides;
     this.#pulledUp = pulledUp;
   }
 }

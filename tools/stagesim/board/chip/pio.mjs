@@ -59,6 +59,29 @@ export class Pio extends BasePeripheral {
     this.#updateRequests();
   }
 
+  note(section, text) {
+    this.rp2040.violations.note(section, `PIO ${this.index}: ${text}`);
+  }
+
+  /** As after the block's reset. Instruction memory keeps what it has: it has no reset (3.7). */
+  reset() {
+    const { cycle } = this.time;
+    for (const machine of this.machines) machine.reset(cycle);
+    this.pinValues = 0;
+    this.pinDirections = 0;
+    this.syncBypass = 0;
+    this.flags = 0;
+    this.flagsToSet = 0;
+    this.flagsToClear = 0;
+    this.debug = 0;
+    this.interruptEnable = [0, 0];
+    this.interruptForce = [0, 0];
+    this.reschedule();
+    this.#updateRequests();
+    this.updateInterrupts();
+    this.pads.update(cycle + 1);
+  }
+
   // Time
 
   /** Lets every machine do what falls due in `cycle`. They see flags and pins as they were when it began. */
@@ -236,7 +259,7 @@ export class Pio extends BasePeripheral {
       case INTR:
         return this.rawInterrupts;
       default:
-        return super.readUint32(offset);
+        return 0;
     }
   }
 
@@ -283,12 +306,6 @@ export class Pio extends BasePeripheral {
         for (const machine of this.machines) machine.settle(cycle);
         this.syncBypass = value;
         break;
-      case FSTAT:
-      case FLEVEL:
-      case INTR:
-        break; // read only
-      default:
-        super.writeUint32(offset, value);
     }
   }
 
@@ -322,6 +339,7 @@ export class Pio extends BasePeripheral {
 
   #writeFifo(machine, value, cycle) {
     if (machine.tx.full) {
+      this.note('3.7', `SM${machine.index}: the TX FIFO is full: the word is lost (FDEBUG.TXOVER)`);
       this.debug |= 1 << (DEBUG_TXOVER + machine.index);
       return;
     }
@@ -332,6 +350,7 @@ export class Pio extends BasePeripheral {
 
   #readFifo(machine) {
     if (machine.rx.empty) {
+      this.note('3.7', `SM${machine.index}: the RX FIFO is empty: what is read is not defined (FDEBUG.RXUNDER)`);
       this.debug |= 1 << (DEBUG_RXUNDER + machine.index);
       return 0;
     }
@@ -365,6 +384,7 @@ export class Pio extends BasePeripheral {
     for (const each of this.machines) each.settle(cycle); // they may share the pins that change hands here
     switch (place) {
       case 0x00:
+        if (value >>> 16 === 0 && value & 0xff00) this.note('3.7', `SM${machine.index}_CLKDIV: with INT 0 (65536) FRAC must be 0`);
         machine.clock.setRegister(value, cycle);
         machine.clockChanged(cycle);
         break;
@@ -376,7 +396,7 @@ export class Pio extends BasePeripheral {
         this.#updateRequests();
         break;
       case 0x0c:
-        break; // read only
+        break; // read only: a JMP by SMx_INSTR sets it
       case 0x10:
         machine.force(value, cycle);
         if (this.flagsToSet | this.flagsToClear) this.#commitFlags(cycle + 1);

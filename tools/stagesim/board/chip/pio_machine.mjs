@@ -24,7 +24,13 @@ export class PioMachine {
     this.block = block;
     this.index = index;
     this.naive = naive;
+    this.reset(0);
+  }
+
+  /** All registers and state as after the block's reset. */
+  reset(cycle) {
     this.clock = new PioClock();
+    this.clock.restart(cycle);
     this.enabled = false;
     this.pc = 0;
     this.x = 0;
@@ -51,6 +57,7 @@ export class PioMachine {
     this.loopTick = 0; // at which it was entered
     this.loopCache = new Map();
 
+    this.shiftCtrl = 0;
     this.setExecCtrl(0x1f << 12);
     this.setShiftCtrl(0x3 << 18);
     this.setPinCtrl(0x5 << 26);
@@ -66,7 +73,7 @@ export class PioMachine {
   // Registers
 
   setExecCtrl(value) {
-    if (value & EXEC_NOT_MODELLED) throw new Error('PIO: INLINE_OUT_EN and OUT_STICKY are not modelled');
+    if (value & EXEC_NOT_MODELLED) this.#note('INLINE_OUT_EN and OUT_STICKY are not modelled');
     this.execCtrl = (value & 0x7fffffff) >>> 0;
     this.sideOptional = (value & EXEC_SIDE_EN) !== 0;
     this.sidePinDirs = (value & EXEC_SIDE_PINDIR) !== 0;
@@ -81,6 +88,7 @@ export class PioMachine {
   /** Changing a join bit empties both FIFOs (datasheet 3.7, SM0_SHIFTCTRL). */
   setShiftCtrl(value) {
     const joins = (SHIFT_JOIN_RX | SHIFT_JOIN_TX) >>> 0;
+    if ((value & joins) >>> 0 === joins) this.#note('both FIFOs are joined: neither has room');
     if (((value ^ this.shiftCtrl) & joins) !== 0) {
       const joinTx = (value & SHIFT_JOIN_TX) !== 0;
       const joinRx = (value & SHIFT_JOIN_RX) !== 0;
@@ -105,7 +113,14 @@ export class PioMachine {
     this.sideBase = (value >>> 10) & 0x1f;
     this.setBase = (value >>> 5) & 0x1f;
     this.outBase = value & 0x1f;
+    if (this.setCount > 5) this.#note(`SET_COUNT ${this.setCount} is more than 5`);
+    if (this.outCount > 32) this.#note(`OUT_COUNT ${this.outCount} is more than 32`);
+    if (this.sideBits > 5) this.#note(`SIDESET_COUNT ${this.sideBits} is more than 5`);
     this.loopCache.clear();
+  }
+
+  #note(text) {
+    this.block.note('3.7', `SM${this.index}: ${text}`);
   }
 
   /** Pins of its side-set, and all that it can drive. */

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Corrections to rp2040js' Cortex-M0+ core: sleeping, waking and faulting as the ARMv6-M manual has it.
+import { correctInterrupts } from './nvic.mjs';
 
 import { BusFault } from './bus.mjs';
 
@@ -31,17 +32,10 @@ export function correctProcessor(chip) {
   };
 
   // An interrupt only ends the sleep; the next instruction boundary takes it, or not under PRIMASK.
-  core.setInterrupt = (number, active) => {
-    const bit = 1 << number;
-    if (!active) {
-      core.pendingInterrupts &= ~bit;
-      return;
-    }
-    if (core.pendingInterrupts & bit) return;
-    core.pendingInterrupts |= bit;
-    core.interruptsUpdated = true;
+  core.onPending = () => {
     if (core.waiting && wakePending(core)) core.waiting = false;
   };
+  correctInterrupts(chip);
 
   // A BKPT without a debugger, and UDF, fault (ARMv6-M B1.5.6).
   chip.onBreak = () => raiseHardFault(chip);

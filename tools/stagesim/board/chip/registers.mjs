@@ -6,13 +6,14 @@
 import { USB_REGISTERS } from './usb_registers.mjs';
 
 const NONE = 0; // read only
+const WRITE_ONLY = true;
 const ALL = 0xffffffff;
 
-/** `count` registers `stride` bytes apart, one group after the other: NAMEn -> [offset, writable bits]. */
+/** `count` registers `stride` bytes apart, one group after the other: NAMEn -> [offset, writable bits, write only]. */
 function repeated(count, stride, group) {
   const all = {};
   for (let n = 0; n < count; n++) {
-    for (const [name, [offset, bits]] of Object.entries(group)) all[name.replace('#', n)] = [offset + n * stride, bits];
+    for (const [name, [offset, ...rest]] of Object.entries(group)) all[name.replace('#', n)] = [offset + n * stride, ...rest];
   }
   return all;
 }
@@ -26,10 +27,10 @@ const SPI = { SSPCR0: [0x0, 0xffff], SSPCR1: [0x4, 0xf], SSPDR: [0x8, 0xffff], S
               SSPIMSC: [0x14, 0xf], SSPRIS: [0x18, NONE], SSPMIS: [0x1c, NONE], SSPICR: [0x20, 0x3], SSPDMACR: [0x24, 0x3] };
 const PIO = {
   CTRL: [0x0, 0xfff], FSTAT: [0x4, NONE], FDEBUG: [0x8, 0x0f0f0f0f], FLEVEL: [0xc, NONE],
-  ...repeated(4, 4, { 'TXF#': [0x10, ALL], 'RXF#': [0x20, NONE] }),
+  ...repeated(4, 4, { 'TXF#': [0x10, ALL, WRITE_ONLY], 'RXF#': [0x20, NONE] }),
   IRQ: [0x30, 0xff], IRQ_FORCE: [0x34, 0xff], INPUT_SYNC_BYPASS: [0x38, ALL],
   DBG_PADOUT: [0x3c, NONE], DBG_PADOE: [0x40, NONE], DBG_CFGINFO: [0x44, NONE],
-  ...repeated(32, 4, { 'INSTR_MEM#': [0x48, 0xffff] }),
+  ...repeated(32, 4, { 'INSTR_MEM#': [0x48, 0xffff, WRITE_ONLY] }),
   ...repeated(4, 0x18, { 'SM#_CLKDIV': [0xc8, 0xffffff00], 'SM#_EXECCTRL': [0xcc, 0x7fffff9f], 'SM#_SHIFTCTRL': [0xd0, 0xffff0000],
                          'SM#_ADDR': [0xd4, NONE], 'SM#_INSTR': [0xd8, 0xffff], 'SM#_PINCTRL': [0xdc, ALL] }),
   INTR: [0x128, NONE],
@@ -62,9 +63,11 @@ export const BLOCKS = [
   { name: 'IO_BANK0', section: '2.19.6.1', base: 0x40014000, reset: 5,
     registers: { ...repeated(30, 8, { 'GPIO#_STATUS': [0x0, NONE], 'GPIO#_CTRL': [0x4, GPIO_CTRL] }),
                  ...repeated(3, 4, { 'INTR#': [0xf0, 0xcccccccc], 'PROC0_INTE#': [0x100, ALL], 'PROC0_INTF#': [0x110, ALL],
-                                     'PROC0_INTS#': [0x120, NONE] }),
+                                     'PROC0_INTS#': [0x120, NONE], 'PROC1_INTE#': [0x130, ALL], 'PROC1_INTF#': [0x140, ALL],
+                                     'PROC1_INTS#': [0x150, NONE] }),
                  INTR3: [0xfc, 0x00cccccc], PROC0_INTE3: [0x10c, 0x00ffffff], PROC0_INTF3: [0x11c, 0x00ffffff],
-                 PROC0_INTS3: [0x12c, NONE] } },
+                 PROC0_INTS3: [0x12c, NONE], PROC1_INTE3: [0x13c, 0x00ffffff], PROC1_INTF3: [0x14c, 0x00ffffff],
+                 PROC1_INTS3: [0x15c, NONE] } },
   { name: 'IO_QSPI', section: '2.19.6.2', base: 0x40018000, reset: 6,
     registers: Object.assign({}, ...['SCLK', 'SS', 'SD0', 'SD1', 'SD2', 'SD3'].map((pin, n) => ({
       [`GPIO_QSPI_${pin}_STATUS`]: [8 * n, NONE], [`GPIO_QSPI_${pin}_CTRL`]: [8 * n + 4, GPIO_CTRL] }))) },
@@ -86,7 +89,7 @@ export const BLOCKS = [
                  TIMERAWH: [0x24, NONE], TIMERAWL: [0x28, NONE], INTR: [0x34, 0xf], INTE: [0x38, 0xf], INTF: [0x3c, 0xf],
                  INTS: [0x40, NONE] } },
   { name: 'WATCHDOG', section: '4.7.6', base: 0x40058000,
-    registers: { CTRL: [0x0, 0xc7000000], LOAD: [0x4, 0xffffff], REASON: [0x8, NONE],
+    registers: { CTRL: [0x0, 0xc7000000], LOAD: [0x4, 0xffffff, WRITE_ONLY], REASON: [0x8, NONE],
                  ...repeated(8, 4, { 'SCRATCH#': [0xc, ALL] }), TICK: [0x2c, 0x3ff] } },
   { name: 'ROSC', section: '2.17.8', base: 0x40060000, registers: { STATUS: [0x18, 0x01000000], RANDOMBIT: [0x1c, NONE] } },
   { name: 'VREG_AND_CHIP_RESET', section: '2.12.7', base: 0x40064000,

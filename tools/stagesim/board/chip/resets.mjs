@@ -68,7 +68,7 @@ export class Resets extends BasePeripheral {
     const block = BLOCKS.find(({ reset }) => reset === bit);
     if (block === undefined) return;
     const peripheral = this.rp2040.peripherals[(block.base >>> 14) << 2];
-    if (typeof peripheral.reset !== 'function') return;
+    if (typeof peripheral.reset !== 'function') throw new Error(`${block.name}: its reset is not modelled`);
     peripheral.reset();
   }
 }

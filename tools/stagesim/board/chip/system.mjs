@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The small blocks around the core that rp2040js lacks or gets wrong: the reset cause, the ring oscillator, the timer's alarms.
+// The small blocks around the core that rp2040js lacks or gets wrong: the reset cause and the ring oscillator.
 import { BasePeripheral } from 'rp2040js';
 
 const WATCHDOG = 0x40058;
@@ -12,21 +12,6 @@ export const Cause = Object.freeze({ POWER: 'power', RUN_PIN: 'run pin', WATCHDO
 export function watchdogLegacy(chip) {
   const { reason, scratch } = chip.peripherals[WATCHDOG];
   return { reason, scratch: scratch.slice(), crystalTicks: Math.max(0, chip.peripherals[XOSC].runningFor) };
-}
-
-/** Stock drops the part of a microsecond that has passed, and so fires up to 1 us early. */
-export function correctTimer(timer) {
-  const ALARM0 = 0x10;
-  const ALARM3 = 0x1c;
-  const write = timer.writeUint32;
-  timer.writeUint32 = (offset, value) => {
-    write.call(timer, offset, value);
-    if (offset < ALARM0 || offset > ALARM3) return;
-    const now_ns = timer.clock.nanos;
-    const wait_us = (value - Math.floor(now_ns / 1000)) >>> 0;
-    const wait_ns = wait_us * 1000 - (now_ns % 1000);
-    timer.alarms[(offset - ALARM0) / 4].clockAlarm.schedule(Math.max(0, wait_ns));
-  };
 }
 
 /** VREG_AND_CHIP_RESET: only CHIP_RESET's cause bits (datasheet 2.12.7), and the regulator's settings as stored. */
