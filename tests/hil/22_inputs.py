@@ -8,9 +8,9 @@ from ols_board import wire
 from ols_board.program import paper_program
 
 MS = 125_000  # ticks
-FROM_TICK = 100 * MS
+FROM_TICK = 250 * MS
 HALF_PERIODS = {"100 kHz": 625, "2 MHz": 31}
-STATUS_ROUNDS = 22
+STATUS_ROUNDS = 40
 
 
 def statistics(board):

@@ -42,6 +42,7 @@ export class IoBank extends BasePeripheral {
       enable.fill(0);
       force.fill(0);
     }
+    this.watched = false; // by processor 0
     for (const pin of this.rp2040.gpio) pin.ctrl = CTRL_RESET;
     this.pads.configure();
     this.#updateInterrupt();
@@ -49,8 +50,10 @@ export class IoBank extends BasePeripheral {
 
   /** Inputs have changed: edges are latched whether or not anybody has enabled them (2.19.3). */
   inputsChanged(risen, fallen) {
-    for (let n = 0; n < REGISTERS; n++) this.edges[n] |= (spread(risen >>> (8 * n)) << 3) | (spread(fallen >>> (8 * n)) << 2);
-    this.#updateInterrupt();
+    for (let n = 0, changed = risen | fallen; changed !== 0; n++, changed >>>= 8) {
+      if (changed & 0xff) this.edges[n] |= (spread(risen >>> (8 * n)) << 3) | (spread(fallen >>> (8 * n)) << 2);
+    }
+    if (this.watched) this.#updateInterrupt();
   }
 
   #raw(n) {
@@ -103,6 +106,7 @@ export class IoBank extends BasePeripheral {
       if (kind === 'raw') this.edges[n] &= ~(this.rawWriteValue & EDGES); // write clear, edges alone
       else if (kind === 'status') this.#note('2.19.6.1', 'IO_BANK0: INTS is read only');
       else set[kind][n] = n === 3 ? value & 0xffffff : value;
+      this.watched = this.sets[0].enable.some(Boolean) || this.sets[0].force.some(Boolean);
       this.#updateInterrupt();
     } else {
       this.#note('2.19.6.1', `IO_BANK0: 0x${offset.toString(16)} is read only, or no register`);
