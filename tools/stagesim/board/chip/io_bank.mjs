@@ -43,6 +43,7 @@ export class IoBank extends BasePeripheral {
       enable.fill(0);
       force.fill(0);
     }
+    this.watched = false; // by processor 0
     for (const pin of this.rp2040.gpio) pin.ctrl = CTRL_RESET;
     this.pads.configure();
     this.#updateInterrupt();
@@ -50,8 +51,10 @@ export class IoBank extends BasePeripheral {
 
   /** Inputs have changed: edges are latched whether or not anybody has enabled them (2.19.3). */
   inputsChanged(risen, fallen) {
-    for (let n = 0; n < REGISTERS; n++) this.edges[n] |= (spread(risen >>> (8 * n)) << 3) | (spread(fallen >>> (8 * n)) << 2);
-    this.#updateInterrupt();
+    for (let n = 0, changed = risen | fallen; changed !== 0; n++, changed >>>= 8) {
+      if (changed & 0xff) this.edges[n] |= (spread(risen >>> (8 * n)) << 3) | (spread(fallen >>> (8 * n)) << 2);
+    }
+    if (this.watched) this.#updateInterrupt();
   }
 
   #raw(n) {
@@ -102,6 +105,7 @@ export class IoBank extends BasePeripheral {
       const [set, kind, n] = this.#place(offset);
       if (kind === 'raw') this.edges[n] &= ~(this.rawWriteValue & EDGES); // write clear, edges alone
       else if (kind !== 'status') set[kind][n] = n === 3 ? value & 0xffffff : value;
+      this.watched = this.sets[0].enable.some(Boolean) || this.sets[0].force.some(Boolean);
       this.#updateInterrupt();
     }
   }

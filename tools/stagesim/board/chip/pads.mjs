@@ -123,11 +123,17 @@ export class Pads {
 
   /** Works out the pads' levels from `cycle` on. Call after anything that drives them has changed. */
   update(cycle) {
-    const [pio0, pio1] = this.#chip.pio;
+    const { pio: [pio0, pio1], sio } = this.#chip;
+    const sources = this.#sources;
+    const made = this.#overrides;
     pio0.pinsChanged = false;
     pio1.pinsChanged = false;
-    const made = this.#peripherals();
-    const [out, driven] = this.#override(made.out, made.driven);
+    // As status() has it, without objects: this runs at every edge.
+    let out = (pio0.pinValues & sources.pio0) | (pio1.pinValues & sources.pio1) | (sio.gpioValue & sources.sio);
+    let driven = (pio0.pinDirections & sources.pio0) | (pio1.pinDirections & sources.pio1) |
+      (sio.gpioOutputEnable & sources.sio);
+    out = ((out ^ made.invert) & ~made.low) | made.high;
+    driven = ((driven ^ made.turn) | made.enable) & ~made.disable;
     const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
     const levels = (out & driven) | (idle & ~driven);
     const { invert, low, high } = this.#inputOverrides;
