@@ -39,11 +39,11 @@ void usb_line_release(void) {
         NVIC_ISER = can_before;
     }
     state = NOTHING_TO_DO;
+    in_doubt = false;
 }
 
 void usb_line_reset(void) {
     usb_line_release();
-    in_doubt = false;
     if (SYSINFO_CHIP_REVISION < REVISION_B2) state = WAITING_FOR_END;
 }
 

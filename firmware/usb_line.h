@@ -13,7 +13,7 @@ void usb_line_reset(void);
 // Once each turn: `status` is SIE_STATUS. `may_borrow` says that GPIO 15 may be another's for up to 2 ms: nothing is armed.
 void usb_line_poll(uint32_t status, uint32_t now_us, bool may_borrow);
 
-// Gives GPIO 15 back at once, if it is borrowed.
+// Gives GPIO 15 back at once, if it is borrowed; what was in doubt is forgotten, for the next bus reset to tell.
 void usb_line_release(void);
 
 // True while the line has been left as it is because GPIO 15 was needed, so that the host may not have been heard.

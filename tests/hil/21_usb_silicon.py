@@ -139,7 +139,7 @@ def test_gpio_15_is_not_borrowed_from_a_board_that_waits_for_its_edge_and_usb_co
         status = over_can.status()
         assert status["state"] == wire.WAITING and status["edges_seen"] == 0, "GENLOCK was forced high"
     over_can.ask(wire.STOP)
-    over_usb.usb.replies.clear()
+    over_can.usb.bus.close()
     ask_until_answered(over_usb)
     over_usb.arm(start=wire.BY_EDGE)
     over_usb.ask(wire.START)
