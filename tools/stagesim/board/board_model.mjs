@@ -137,6 +137,12 @@ export class Board {
     this.#parts.pads.drive(gpio, level);
   }
 
+  /** Shorts a pad of the board to a level, whatever drives it; null takes the short away. */
+  short(gpio, level) {
+    this.#shorts.set(gpio, level); // and again after a reset
+    this.#parts.pads.short(gpio, level);
+  }
+
   unplug() {
     this.usbHost.unplug();
     this.#options.onUnplug();
