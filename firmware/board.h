@@ -42,6 +42,12 @@ void board_connect_pins(uint8_t inverted_triggers);
 // Bit n: stop input n is low now. That it was, however shortly, is for its handler (interrupts.h).
 uint32_t board_stop_inputs(void);
 
+// LIGHT_EN's pad says "lit" now, whoever drives it.
+bool board_light_is_on(void);
+
+// Changes HEALTHY, which nothing else does: board_dark leaves it as it is, and a reset makes it low.
+void board_pulse_healthy(void);
+
 // Lets no handler run until board_release_interrupts, which wants what this returned. For some hundred instructions at
 // most: the times of docs/firmware.md, "How each doubt ends dark", reckon with it.
 uint32_t board_hold_interrupts(void);

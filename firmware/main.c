@@ -4,6 +4,7 @@
 #include "board.h"
 #include "can.h"
 #include "fault.h"
+#include "healthy.h"
 #include "interrupts.h"
 #include "link.h"
 #include "player.h"
@@ -27,7 +28,9 @@ int main(void) {
         usb_poll();
         can_poll();
         stage_poll(link_host_is_there());
-        if (!link_poll()) board_sleep();
+        const bool is_busy = link_poll();
+        healthy_turn();
+        if (!is_busy) board_sleep();
         if (link_is_leaving()) board_enter_bootloader();
     }
 }

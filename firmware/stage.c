@@ -53,6 +53,8 @@ static bool refuse(struct ols_error_reply* error, enum ols_error_code code, cons
     return false;
 }
 
+#define STUCK_LIGHT "LIGHT_EN's pad is lit although the firmware holds it dark: switch the lamps' supply off"
+
 static bool refuse_fault(struct ols_error_reply* error) {
     return refuse(error, OLS_ERROR_FAULT_LATCHED, "a fault is latched: read the status, then clear the fault");
 }
@@ -226,6 +228,15 @@ bool stage_is_armed(void) {
     return state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
 }
 
+bool stage_must_be_dark(void) {
+    if (state == OLS_STATE_WAITING) return stop_seen() != OLS_FAULT_NONE || player_waiting();
+    return state != OLS_STATE_PLAYING || stop_seen() != OLS_FAULT_NONE;
+}
+
+void stage_note_stuck_light(void) {
+    if (state != OLS_STATE_FAULT) end_in_fault(OLS_FAULT_LIGHT_STUCK);
+}
+
 static void begin_play(void) {
     start_us = board_time_us();
     state = OLS_STATE_PLAYING;
@@ -337,6 +348,7 @@ static bool arm_is_valid(const struct ols_arm* arm, struct ols_error_reply* erro
 
 // What must be so before anything may be lit.
 static bool arm_is_safe(struct ols_error_reply* error) {
+    if (board_light_is_on()) return refuse(error, OLS_ERROR_NOT_SAFE, STUCK_LIGHT);
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP)
         return refuse(error, OLS_ERROR_NOT_SAFE, "the emergency stop is pressed, or its wire is open: release it");
@@ -444,6 +456,10 @@ enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_repl
 bool stage_clear_fault(struct ols_error_reply* error) {
     if (state != OLS_STATE_FAULT) return refuse(error, OLS_ERROR_BAD_STATE, "no fault is latched: nothing to clear");
     fault_clear();
+    if (board_light_is_on()) {  // which matters more than what was latched
+        fault_latch(OLS_FAULT_LIGHT_STUCK, OLS_NO_SLOT, 0);
+        return refuse(error, OLS_ERROR_NOT_SAFE, STUCK_LIGHT);
+    }
     forget_programs();
     return true;
 }

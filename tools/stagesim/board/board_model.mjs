@@ -25,6 +25,7 @@ export class Board {
   #resetCause = null; // of a reset that is due
   #can = null;
   #inputs; // levels from outside, by GPIO
+  #shorts = new Map(); // levels of shorted pads, by GPIO
 
   /**
    * @param {object} image from readImage
@@ -82,6 +83,11 @@ export class Board {
   get handlerTimes() {
     const { handlers, longestHeld } = this.#parts.lockstep.handlerTimes;
     return { handlers: Object.fromEntries(handlers), held: longestHeld };
+  }
+
+  /** The CAN controller's bit timing as it is set, null without one. */
+  get canTiming() {
+    return this.#can?.bitTiming ?? null;
   }
 
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
@@ -162,6 +168,7 @@ export class Board {
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     };
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
+    for (const [gpio, level] of this.#shorts) this.#parts.pads.short(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
     if (startsUsbBoot(scratch)) {

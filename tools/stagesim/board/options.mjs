@@ -27,7 +27,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
                       reset, watchdog, hardfault; hang: the main program stops, lockup: handlers, too; starve: DMA,
                       or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
                       suspend and busreset of USB; estop, overtemperature, openlamp pull that input low, release
-                      lets all go high; genlock and genlockfall are edges of that input
+                      lets all go high; genlock and genlockfall are edges of that input; short:GPIO:LEVEL of a pad,
+                      whatever drives it, unshort:GPIO
   --stats             print ticks, speed, dropped lines and violations as JSON at the end
   --help
 

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// Healthy: whether this turn may say so.
+#include "healthy.h"
+
+#include <stdbool.h>
+
+#include "board.h"
+#include "fault.h"
+#include "stage.h"
+#include "stop.h"
+
+static bool doubted;  // since the pad, or the light watch, said so
+
+static bool is_of_the_light(enum ols_fault cause) {
+    return cause == OLS_FAULT_OVER_DUTY || cause == OLS_FAULT_LIGHT_STUCK;
+}
+
+// A cycle that waits for its edge may begin at any tick, so it must be dark before the look at the pad and after it: within
+// a look that no interrupt lengthens, no cycle begins and ends.
+static bool is_lit_in_the_dark(void) {
+    const uint32_t held = board_hold_interrupts();
+    const bool is_lit = stage_must_be_dark() && board_light_is_on() && stage_must_be_dark();
+    board_release_interrupts(held);
+    return is_lit;
+}
+
+void healthy_turn(void) {
+    const bool is_lit = is_lit_in_the_dark();
+    if (is_lit) stage_note_stuck_light();
+    const enum ols_fault latched = fault_latched().cause;
+    doubted =
+        is_lit || is_of_the_light(latched) || is_of_the_light(stop_seen()) || (doubted && latched != OLS_FAULT_NONE);
+    if (!doubted) board_pulse_healthy();
+}
