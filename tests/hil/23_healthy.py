@@ -39,14 +39,14 @@ def last_before(ticks, end):
 
 
 def test_it_changes_often_enough_idle_in_a_long_upload_armed_playing_and_in_a_dark_fault(emulated):
-    board = emulated("--inject", f"estop@trigger:700", trace=True)
+    board = emulated("--inject", "estop@trigger:9000", trace=True)
     link = board.plug()
     pass_time(link, 20_000)
     slots = [{"kind": wire.BASIS, "trigger_mask": 15, "exposure_ticks": 20_000, "period_ticks": 40_000,
               "trigger_offset_ticks": 10 * (n % 7), "bits": [(n + lamp) % 2 for lamp in range(156)] + [0] * 20}
              for n in range(1024)]
     whole = {"cycles": 0, "chain_bits": CHAIN_BITS, "slots": slots, "lead_ticks": 2000,
-             "triggers": [{}, {"offset_ticks": 50}, {"offset_ticks": 111, "width_ticks": 99}, {"offset_ticks": -77}]}
+             "triggers": [{}, {"offset_ticks": 200}, {"offset_ticks": 400, "width_ticks": 99}, {"offset_ticks": -100}]}
     link.load(whole)
     link.arm()
     pass_time(link, 20_000)
@@ -199,11 +199,3 @@ def test_a_board_that_boots_with_the_pad_lit_never_says_that_it_is_healthy(emula
     assert wire.FAULTS[link.status()["fault"]] == "light stuck"
     board.stop()
     assert beats(board) == []
-
-
-def test_it_does_not_make_time_pass_for_a_board_at_rest(emulated):
-    board = emulated(trace=True)
-    link = board.plug()
-    link.status()
-    ticks = board.stop()["ticks"]
-    assert ticks < 100 * MS
