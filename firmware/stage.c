@@ -228,13 +228,12 @@ bool stage_is_armed(void) {
     return state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
 }
 
-bool stage_must_be_dark(void) {
-    if (state == OLS_STATE_WAITING) return stop_seen() != OLS_FAULT_NONE || player_waiting();
-    return state != OLS_STATE_PLAYING || stop_seen() != OLS_FAULT_NONE;
+enum ols_state stage_state(void) {
+    return state;
 }
 
-void stage_note_stuck_light(void) {
-    if (state != OLS_STATE_FAULT) end_in_fault(OLS_FAULT_LIGHT_STUCK);
+void stage_fail(enum ols_fault cause) {
+    if (state != OLS_STATE_FAULT) end_in_fault(cause);
 }
 
 static void begin_play(void) {
@@ -455,11 +454,7 @@ enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_repl
 
 bool stage_clear_fault(struct ols_error_reply* error) {
     if (state != OLS_STATE_FAULT) return refuse(error, OLS_ERROR_BAD_STATE, "no fault is latched: nothing to clear");
-    fault_clear();
-    if (board_light_is_on()) {  // which matters more than what was latched
-        fault_latch(OLS_FAULT_LIGHT_STUCK, OLS_NO_SLOT, 0);
-        return refuse(error, OLS_ERROR_NOT_SAFE, STUCK_LIGHT);
-    }
+    if (!fault_clear()) return refuse(error, OLS_ERROR_NOT_SAFE, STUCK_LIGHT);
     forget_programs();
     return true;
 }

@@ -46,11 +46,10 @@ struct ols_canbus_state stage_summary(void);
 // Armed, waiting for the edge that starts, or playing.
 bool stage_is_armed(void);
 
-// Nothing may be lit at this moment: no program plays, or a handler has stopped it.
-bool stage_must_be_dark(void);
+// By the main loop's last look: a program that waits for an edge may have begun to play since.
+enum ols_state stage_state(void);
 
-// The light's pad is lit although it must be dark: a fault, unless one is latched already. It is not cleared before the pad is
-// dark.
-void stage_note_stuck_light(void);
+// Dark, and the cause is latched, or the one that a handler has seen before; nothing in a fault.
+void stage_fail(enum ols_fault cause);
 
 #endif

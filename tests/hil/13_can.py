@@ -78,7 +78,7 @@ def test_the_bit_timing_leaves_a_bus_of_20_metres_its_time(emulated):
     if not EMULATED:
         pytest.skip("needs the emulated controller's registers")
     board = emulated(can=True)
-    board.plug_can()
+    board.plug_can().hello(0)  # so it has been set
     timing = board.stop()["can"]
     # There and back, each way through one transceiver's loop of 150 ns and 20 m of 5 ns (docs/hardware.md, "CAN").
     assert timing["propagation"] * timing["quantum_ns"] >= 2 * (150 + 20 * 5)
