@@ -27,6 +27,8 @@ void fault_latch(enum ols_fault cause, uint16_t slot, uint64_t ticks);
 // What is latched.
 struct fault fault_latched(void);
 
+#define FAULT_LIGHT_STUCK_TEXT "LIGHT_EN's pad is lit although the firmware holds it dark: switch the lamps' supply off"
+
 // False while the light's pad is lit, which is the fault that is latched from then on. While nothing may be lit.
 bool fault_clear(void);
 

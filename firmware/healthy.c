@@ -17,16 +17,17 @@ static bool is_of_the_light(enum ols_fault cause) {
 }
 
 // Nothing may be lit now: no program plays, or a handler has stopped it.
-static bool must_be_dark(void) {
+static bool must_be_dark(uint8_t state) {
     if (stop_seen() != OLS_FAULT_NONE) return true;
-    return stage_state() == OLS_STATE_WAITING ? player_waiting() : stage_state() != OLS_STATE_PLAYING;
+    return state == OLS_STATE_WAITING ? player_waiting() : state != OLS_STATE_PLAYING;
 }
 
 // A cycle that waits for its edge may begin at any tick, so it must be dark before the look at the pad and after it: within
 // a look that no interrupt lengthens, no cycle begins and ends.
 static bool is_lit_in_the_dark(void) {
+    const uint8_t state = stage_summary().state;  // the main loop's own, by its last look
     const uint32_t held = board_hold_interrupts();
-    const bool is_lit = must_be_dark() && board_light_is_on() && must_be_dark();
+    const bool is_lit = must_be_dark(state) && board_light_is_on() && must_be_dark(state);
     board_release_interrupts(held);
     return is_lit;
 }

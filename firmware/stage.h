@@ -46,9 +46,6 @@ struct ols_canbus_state stage_summary(void);
 // Armed, waiting for the edge that starts, or playing.
 bool stage_is_armed(void);
 
-// By the main loop's last look: a program that waits for an edge may have begun to play since.
-enum ols_state stage_state(void);
-
 // Dark, and the cause is latched, or the one that a handler has seen before; nothing in a fault.
 void stage_fail(enum ols_fault cause);
 
