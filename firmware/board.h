@@ -49,6 +49,12 @@ void board_watch_stop_inputs(void);
 // The next rise of GENLOCK, one, ends board_sleep.
 void board_watch_genlock(void);
 
+// LIGHT_EN's pad says "lit" now, whoever drives it.
+bool board_light_is_on(void);
+
+// Changes HEALTHY, which nothing else does: board_dark leaves it as it is, and a reset makes it low.
+void board_pulse_healthy(void);
+
 // Lets no handler run until board_release_interrupts, which wants what this returned. For some hundred instructions at
 // most: the times of docs/firmware.md, "How each doubt ends dark", reckon with it.
 uint32_t board_hold_interrupts(void);

@@ -10,6 +10,7 @@
 #include "board.h"
 #include "can.h"
 #include "fault.h"
+#include "healthy.h"
 #include "light_watch.h"
 #include "link.h"
 #include "player.h"
@@ -32,6 +33,8 @@ static struct {
     uint32_t stop_inputs;          // low now
     uint64_t message_until_us;     // 0: no message is expected
     uint32_t longest_light_ticks;  // that is allowed
+    bool light_shorted;            // to the level that lights
+    uint32_t healthy_changes;
 
     struct sequence* armed;
     const struct sequence* following;  // from cycle following_from on; null when no swap is due
@@ -83,7 +86,9 @@ void board_host_bite(void) {
 static bool turn_main_loop(void) {
     can_poll();
     stage_poll(link_host_is_there());
-    return link_poll();
+    const bool is_busy = link_poll();
+    healthy_turn();
+    return is_busy;
 }
 
 // Fires what is due until now.
@@ -182,6 +187,14 @@ void board_host_hold_light(uint32_t ticks) {
     if (ticks > board.longest_light_ticks) stop_now(OLS_FAULT_OVER_DUTY);
 }
 
+void board_host_short_light(bool shorted) {
+    board.light_shorted = shorted;
+}
+
+uint32_t board_host_healthy_changes(void) {
+    return board.healthy_changes;
+}
+
 bool board_host_pins_are_connected(void) {
     return board.pins_connected;
 }
@@ -207,6 +220,14 @@ void board_watch_stop_inputs(void) {
 
 void board_watch_genlock(void) {
     // Nobody sleeps here.
+}
+
+bool board_light_is_on(void) {
+    return board.light_shorted || (board.pins_connected && board.playing);
+}
+
+void board_pulse_healthy(void) {
+    board.healthy_changes++;
 }
 
 uint32_t board_hold_interrupts(void) {

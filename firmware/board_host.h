@@ -36,6 +36,12 @@ void board_host_corrupt_program(void);
 // A light of so many ticks at LIGHT_EN's pad, whatever the program says.
 void board_host_hold_light(uint32_t ticks);
 
+// LIGHT_EN's pad is lit, whoever drives it, or no longer.
+void board_host_short_light(bool shorted);
+
+// How often HEALTHY has changed since power-up.
+uint32_t board_host_healthy_changes(void);
+
 // A rise of GENLOCK that debouncing lets through.
 void board_host_genlock(void);
 

@@ -34,7 +34,7 @@ static void prepare_dark(uint32_t inverted) {
 }
 
 void board_dark(void) {
-    // What they show is SIO's output register, which init_pins has cleared and nobody sets.
+    // What they show is SIO's output register, which init_pins has cleared; nobody but HEALTHY, none of these, is set in it.
     for (uint32_t n = 0; n < OUTPUT_PINS; n++) *outputs[n].control = outputs[n].dark;
 }
 
@@ -52,7 +52,7 @@ static void init_pins(void) {
     for (uint32_t n = 0; n < OUTPUT_PINS; n++) {
         const uint32_t pin = output_pins[n];
         const bool pull_up = pin == BOARD_PIN_LIGHT_EN && BOARD_LIGHT_EN_ACTIVE_LOW;
-        PAD_GPIO(pin) = PAD_INPUT | PAD_4MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
+        PAD_GPIO(pin) = PAD_INPUT | PAD_12MA | PAD_SCHMITT | (pull_up ? PAD_PULL_UP : PAD_PULL_DOWN);
     }
     for (uint32_t pin = BOARD_PIN_STOP_INPUTS; pin < BOARD_PIN_STOP_INPUTS + BOARD_STOP_INPUTS; pin++) {
         PAD_GPIO(pin) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
@@ -60,6 +60,8 @@ static void init_pins(void) {
     PAD_GPIO(BOARD_PIN_GENLOCK) = PAD_INPUT | PAD_SCHMITT | PAD_PULL_DOWN;
     PAD_GPIO(BOARD_PIN_PHOTO) = PAD_INPUT | PAD_4MA | PAD_PULL_DOWN;
     GPIO_CTRL(BOARD_PIN_PHOTO) = GPIO_FUNCTION_PIO1 | GPIO_OUTPUT_ALWAYS;
+    PAD_GPIO(BOARD_PIN_HEALTHY) = PAD_INPUT | PAD_12MA | PAD_PULL_DOWN;
+    GPIO_CTRL(BOARD_PIN_HEALTHY) = GPIO_FUNCTION_SIO | GPIO_OUTPUT_ALWAYS;
 }
 
 void board_init(void) {
@@ -94,6 +96,14 @@ void board_watch_stop_inputs(void) {
 
 void board_watch_genlock(void) {
     watch_edge(BOARD_PIN_GENLOCK, GPIO_EDGE_HIGH(BOARD_PIN_GENLOCK));
+}
+
+bool board_light_is_on(void) {
+    return (GPIO_STATUS(BOARD_PIN_LIGHT_EN) & GPIO_FROM_PAD) != (BOARD_LIGHT_EN_ACTIVE_LOW ? GPIO_FROM_PAD : 0);
+}
+
+void board_pulse_healthy(void) {
+    SIO_GPIO_OUT_XOR = 1u << BOARD_PIN_HEALTHY;
 }
 
 uint32_t board_hold_interrupts(void) {

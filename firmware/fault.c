@@ -41,8 +41,10 @@ struct fault fault_latched(void) {
     return latched;
 }
 
-void fault_clear(void) {
-    latched = (struct fault){OLS_FAULT_NONE, OLS_NO_SLOT, 0};
+bool fault_clear(void) {
+    const bool is_dark = !board_light_is_on();
+    latched = (struct fault){is_dark ? OLS_FAULT_NONE : OLS_FAULT_LIGHT_STUCK, OLS_NO_SLOT, 0};
+    return is_dark;
 }
 
 void fault_note_progress(uint16_t slot, uint64_t ticks) {

@@ -26,7 +26,11 @@ void fault_latch(enum ols_fault cause, uint16_t slot, uint64_t ticks);
 
 // What is latched.
 struct fault fault_latched(void);
-void fault_clear(void);
+
+#define FAULT_LIGHT_STUCK_TEXT "LIGHT_EN's pad is lit although the firmware holds it dark: switch the lamps' supply off"
+
+// False while the light's pad is lit, which is the fault that is latched from then on. While nothing may be lit.
+bool fault_clear(void);
 
 // While a program plays: where it is, so that a hang is reported with slot and tick after the watchdog's reset.
 void fault_note_progress(uint16_t slot, uint64_t ticks);

@@ -4,6 +4,7 @@
 #include "board.h"
 #include "can.h"
 #include "fault.h"
+#include "healthy.h"
 #include "interrupts.h"
 #include "link.h"
 #include "player.h"
@@ -28,7 +29,9 @@ int main(void) {
         can_poll();
         stage_poll(link_host_is_there());
         usb_poll(!stage_is_armed());  // again: a packet a turn would be too few for every trigger of 20 000 slots/s
-        if (!link_poll()) board_sleep();
+        const bool is_busy = link_poll();
+        healthy_turn();
+        if (!is_busy) board_sleep();
         if (link_is_leaving()) board_enter_bootloader();
     }
 }

@@ -43,14 +43,20 @@ enum {
     GIVE_UP_US = 1000000
 };
 
-// Eight quanta of 1 or 2 oscillator periods' pairs: 1 of sync, 2 of propagation, 3 and 2 around the sample at 75 %.
+// Eight quanta of 1 or 2 oscillator periods' pairs: 1 of sync, 4 of propagation, 1 and 2 around the sample at 75 % (chapter 5).
+// At 1 Mbit/s a dominant bit of the far end has 500 ns to be seen here: twice the cable and the transceivers' loop delay,
+// docs/hardware.md, "CAN". Propagation and phase 1 together are not shorter than phase 2, nor is that as short as a jump (5.3).
 enum {
     QUANTA = 8,
+    PROPAGATION = 4,
+    PHASE_1 = 1,
+    PHASE_2 = 2,
     PRESCALER = BOARD_CAN_OSCILLATOR_HZ / 2 / QUANTA / (BOARD_CAN_KBIT_S * 1000),
     TIMING_1 = PRESCALER - 1,
-    TIMING_2 = 0x80 | (3 - 1) << 3 | (2 - 1),
-    TIMING_3 = 2 - 1
+    TIMING_2 = 0x80 | (PHASE_1 - 1) << 3 | (PROPAGATION - 1),
+    TIMING_3 = PHASE_2 - 1
 };
+_Static_assert(1 + PROPAGATION + PHASE_1 + PHASE_2 == QUANTA, "the segments are a bit");
 _Static_assert(PRESCALER >= 1 && PRESCALER * 2 * QUANTA * BOARD_CAN_KBIT_S * 1000 == BOARD_CAN_OSCILLATOR_HZ,
                "the oscillator must give eight whole quanta a bit");
 

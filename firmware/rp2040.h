@@ -129,6 +129,7 @@ enum {
     PAD_PULL_DOWN = 1 << 2,
     PAD_PULL_UP = 1 << 3,
     PAD_4MA = 1 << 4,
+    PAD_12MA = 3 << 4,
     PAD_INPUT = 1 << 6
 };
 
@@ -288,8 +289,10 @@ enum {
     USB_BUFFER_BYTES = 0x3ff
 };
 
-// Single-cycle IO: output levels (2.3.1.2); the divider, done 8 cycles after the divisor is written (2.3.1.5)
+// Single-cycle IO: output levels, and a write of ones that inverts them (2.3.1.2, 2.3.1.7); the divider, done 8 cycles after the
+// divisor is written (2.3.1.5)
 #define SIO_GPIO_OUT REGISTER(0xd0000010)
+#define SIO_GPIO_OUT_XOR REGISTER(0xd000001c)
 #define SIO_DIV_UDIVIDEND REGISTER(0xd0000060)
 #define SIO_DIV_UDIVISOR REGISTER(0xd0000064)
 #define SIO_DIV_QUOTIENT REGISTER(0xd0000070)

@@ -7,14 +7,17 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "board_pins.h"
 #include "sequence.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-// Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser.
-enum { SCHEDULE_TOLERANCE_TICKS = 3 };
+// Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser. A pad whose
+// first step on the cable stays near the input's threshold crosses it only when the far end's echo is back, or does not wait
+// for it: docs/hardware.md, "Levels and cables".
+enum { SCHEDULE_TOLERANCE_TICKS = 2 + 1 + BOARD_CABLE_TRIGGER_ECHO_TICKS };
 
 // A new start of `sequence`, before its first trigger. It must stay as it is while it plays. `cycles_wait`: each cycle begins
 // whenever an edge comes, so only the triggers within a cycle have a schedule; no swap then.

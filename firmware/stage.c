@@ -70,8 +70,7 @@ static uint32_t sequence_bytes(const struct sequence* sequence) {
     return sequence->header.program_bytes + 4 * (2 + sequence->cycle_words);
 }
 
-// Goes on with the CRC of a sequence's words; true when it is complete. All at once would take half of the watchdog's
-// time.
+// Goes on with the CRC of a sequence's words; true when complete. All at once takes half of the watchdog's time.
 static bool check_words(struct check* check, const struct sequence* sequence, uint32_t bytes_a_turn) {
     const uint32_t left = sequence_bytes(sequence) - check->bytes;
     const uint32_t now = left < bytes_a_turn ? left : bytes_a_turn;
@@ -220,8 +219,7 @@ static void follow_play(void) {
     fault_note_progress(trigger_log_slot(), ticks_since_start());
 }
 
-// The fault that a level of the stop inputs, or the host's absence, means; OLS_FAULT_NONE when all is well. Handlers have
-// seen the change before this does (interrupts.h).
+// What a level of the stop inputs, or the host's absence, means. Handlers have seen the change before (interrupts.h).
 static enum ols_fault cause_from_outside(bool host_is_there) {
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP) return OLS_FAULT_EMERGENCY_STOP;
@@ -232,6 +230,10 @@ static enum ols_fault cause_from_outside(bool host_is_there) {
 
 bool stage_is_armed(void) {
     return state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING;
+}
+
+void stage_fail(enum ols_fault cause) {
+    if (state != OLS_STATE_FAULT) end_in_fault(cause);
 }
 
 static void begin_play(void) {
@@ -346,6 +348,7 @@ static bool arm_is_valid(const struct ols_arm* arm, struct ols_error_reply* erro
 
 // What must be so before anything may be lit.
 static bool arm_is_safe(struct ols_error_reply* error) {
+    if (board_light_is_on()) return refuse(error, OLS_ERROR_NOT_SAFE, FAULT_LIGHT_STUCK_TEXT);
     const uint32_t stops = board_stop_inputs();
     if (stops & 1u << BOARD_EMERGENCY_STOP)
         return refuse(error, OLS_ERROR_NOT_SAFE, "the emergency stop is pressed, or its wire is open: release it");
@@ -452,7 +455,7 @@ enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_repl
 
 bool stage_clear_fault(struct ols_error_reply* error) {
     if (state != OLS_STATE_FAULT) return refuse(error, OLS_ERROR_BAD_STATE, "no fault is latched: nothing to clear");
-    fault_clear();
+    if (!fault_clear()) return refuse(error, OLS_ERROR_NOT_SAFE, FAULT_LIGHT_STUCK_TEXT);
     forget_programs();
     return true;
 }

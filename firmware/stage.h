@@ -46,4 +46,7 @@ struct ols_canbus_state stage_summary(void);
 // Armed, waiting for the edge that starts, or playing.
 bool stage_is_armed(void);
 
+// Dark, and the cause is latched, or the one that a handler has seen before; nothing in a fault.
+void stage_fail(enum ols_fault cause);
+
 #endif

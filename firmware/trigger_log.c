@@ -6,11 +6,10 @@
 
 #include "cycle_digest.h"
 #include "pulse.h"
+#include "schedule.h"
 
 enum {
     LOG_ENTRIES = 1024,
-    // Stamps are floors to two ticks, so two of them may disagree by two; one more for the pin's input synchroniser.
-    TOLERANCE_TICKS = 3,
     WATCHED_TRIGGER = 1 << 0  // TRIG0
 };
 
@@ -120,7 +119,7 @@ bool trigger_log_add(uint32_t stamp, uint64_t now_ticks) {
     step_slot();
     if (cycles_wait && find_slot() && cycle != last.cycle) cycle_digest_end(true);  // nobody knows when the next begins
     const int64_t slip_ticks = error_ticks - first_error_ticks;
-    return slip_ticks <= TOLERANCE_TICKS && slip_ticks >= -TOLERANCE_TICKS;
+    return slip_ticks <= SCHEDULE_TOLERANCE_TICKS && slip_ticks >= -SCHEDULE_TOLERANCE_TICKS;
 }
 
 void trigger_log_skip(uint32_t count) {

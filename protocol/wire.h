@@ -190,7 +190,8 @@ enum ols_fault {
     OLS_FAULT_OVER_TEMPERATURE = 9,  // said a lamp driver
     OLS_FAULT_OPEN_LAMP = 10,        // said a lamp driver
     OLS_FAULT_HEARTBEAT = 11,        // no message from the host for the time chosen when arming
-    OLS_FAULT_OVER_DUTY = 12         // a light was longer, measured at the pin, than any of the program's
+    OLS_FAULT_OVER_DUTY = 12,        // a light was longer, measured at the pin, than any of the program's
+    OLS_FAULT_LIGHT_STUCK = 13       // the light's pin was lit while nothing may be: cleared only when it is dark again
 };
 
 struct ols_status_reply {

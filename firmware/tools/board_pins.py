@@ -8,18 +8,23 @@ usage: board_pins.py header BOARD.toml            C header for the firmware
        board_pins.py write-json|write-table FILE BOARD.toml...  brings the committed file up to date
 """
 import json
+import math
 import sys
 import tomllib
 
 TIMELINE = ['LATCH', 'LIGHT_EN', 'TRIG0', 'TRIG1', 'TRIG2', 'TRIG3', 'SYNC', 'READY']  # bits 0 to 7 of an event's pins
 PLAYER = ['DATA', 'CLK'] + TIMELINE  # of PIO block 0
-OUTPUTS = PLAYER + ['PHOTO']
+OUTPUTS = PLAYER + ['PHOTO', 'HEALTHY']
 OPTIONAL = ['READY']  # a board may not have it
 STOP_INPUTS = ['ESTOP', 'OVER_TEMPERATURE', 'OPEN_LAMP']  # enum board_stop_input of board.h
 INPUTS = ['GENLOCK']
 CAN_PINS = ['CAN_MISO', 'CAN_SCK', 'CAN_MOSI', 'CAN_STANDBY', 'CAN_RESET', 'CAN_CS', 'CAN_INTERRUPT']
 GPIOS = 30  # of the RP2040 (datasheet 1.4.3)
 NAME_BYTES = 16  # with its zero, in ols_hello_reply
+CABLES = ['trigger_m']
+CABLE_M_MAX = 10
+CABLE_NS_PER_M = 5  # 0.66 of the speed of light, as in polyethylene
+TICK_NS = 8
 BEGIN, END = '<!-- pins: made by firmware/tools/board_pins.py -->\n', '<!-- end of pins -->\n'
 
 
@@ -58,6 +63,11 @@ def check(board):
     consecutive(board['stop_inputs'], STOP_INPUTS)
     if len(board['name'].encode()) >= NAME_BYTES:
         raise BoardError(f'the name "{board["name"]}" is longer than the {NAME_BYTES - 1} bytes of a hello')
+    if sorted(board['cables']) != sorted(CABLES):
+        raise BoardError(f'[cables] must name {", ".join(CABLES)}')
+    for name, metres in board['cables'].items():
+        if not 0 <= metres <= CABLE_M_MAX:
+            raise BoardError(f'[cables] {name}: a cable of 3.3 V logic has 0 to {CABLE_M_MAX} m, not {metres}')
     if not 1 <= board['shift']['chain_bits'] <= 256:
         raise BoardError('a chain has 1 to 256 bits: a whole pattern must fit the shifter\'s FIFO')
 
@@ -88,6 +98,7 @@ def header(board):
               ('BOARD_LIGHT_EN_ACTIVE_LOW', int(board['light']['enable_active_low'])),
               ('BOARD_CHAIN_BITS', board['shift']['chain_bits']), ('BOARD_SHIFT_DIVIDER', board['shift']['divider'])]
     pairs += [(f'BOARD_{name.upper()}', value) for name, value in board['limits'].items()]
+    pairs += [(f'BOARD_CABLE_{name.removesuffix("_m").upper()}_ECHO_TICKS', echo_ticks(board['cables'][name])) for name in CABLES]
     if can:
         pairs += [(f'BOARD_PIN_{name}', can['pins'][name]['gpio']) for name in CAN_PINS]
         pairs += [('BOARD_CAN_SPI', can['spi']), ('BOARD_CAN_OSCILLATOR_HZ', can['oscillator_hz'])]
@@ -109,6 +120,11 @@ def boards_json(boards):
                               'can': {'spi': board['can']['spi'], 'pins': gpios(board['can']['pins'])} if 'can' in board else None}
               for board in boards}
     return json.dumps(tables, indent=2) + '\n'
+
+
+def echo_ticks(metres):
+    """How long what a far end sends back may take there and back, in whole ticks."""
+    return math.ceil(2 * metres * CABLE_NS_PER_M / TICK_NS)
 
 
 def rows(board):

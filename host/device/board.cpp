@@ -74,6 +74,11 @@ std::string fault_text(const ols_status_reply& status) {
             text =
                 "over_duty: a light was longer than the program's longest; do not use this board before it is checked";
             break;
+        case OLS_FAULT_LIGHT_STUCK:
+            text =
+                "light_stuck: LIGHT_EN is lit although the board holds it dark; switch the lamps' supply off and check "
+                "the wiring";
+            break;
     }
     const std::string slot =
         status.fault_slot == OLS_NO_SLOT ? "" : fmt::format(" in slot {}", uint16_t(status.fault_slot));

@@ -74,6 +74,20 @@ def test_the_feather_image_finds_its_controller_on_its_own_pins(emulated):
     assert emulated(image=image, can=True).plug_can().hello(0)["board"].rstrip(b"\0") == b"feather_can"
 
 
+def test_the_bit_timing_leaves_a_bus_of_20_metres_its_time(emulated):
+    if not EMULATED:
+        pytest.skip("needs the emulated controller's registers")
+    board = emulated(can=True)
+    board.plug_can().hello(0)  # so it has been set
+    timing = board.stop()["can"]
+    # There and back, each way through one transceiver's loop of 150 ns and 20 m of 5 ns (docs/hardware.md, "CAN").
+    assert timing["propagation"] * timing["quantum_ns"] >= 2 * (150 + 20 * 5)
+    sample = 1 + timing["propagation"] + timing["phase1"]
+    assert sample / (sample + timing["phase2"]) == 0.75
+    # Rules of Microchip DS20001801J 5.3
+    assert timing["propagation"] + timing["phase1"] >= timing["phase2"] > timing["jump"] <= timing["phase1"]
+
+
 def test_a_program_of_180_slots_is_uploaded_at_the_buss_pace(board):
     link = board.plug_can()
     link.hello(0)

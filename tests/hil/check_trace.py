@@ -23,8 +23,9 @@ DARK = 3
 TRIGGERS = ("TRIG0", "TRIG1", "TRIG2", "TRIG3")
 
 
-def read_vcd(path):
-    """The value changes of a VCD with a time scale of 1 ns, as (tick, signal name, level) in order of time."""
+def read_vcd(path, healthy=False):
+    """The value changes of a VCD with a time scale of 1 ns, as (tick, signal name, level) in order of time. HEALTHY, which
+    beats as the main loop turns and not as a program plays, is left out unless asked for."""
     names, changes, tick = {}, [], 0
     with open(path) as lines:
         for line in lines:
@@ -35,7 +36,7 @@ def read_vcd(path):
                 tick, rest = divmod(int(line[1:]), TICK_NS)
                 if rest:
                     raise SystemExit(f"{path}: the time {line.strip()} is not a whole tick")
-            elif line[0] in "01" and names:
+            elif line[0] in "01" and names and (healthy or names[line[1:].strip()] != "HEALTHY"):
                 changes.append((tick, names[line[1:].strip()], int(line[0])))
     if not changes:
         raise SystemExit(f"{path}: no value changes; is this a VCD of the board?")

@@ -149,12 +149,12 @@ TEST(Board, every_fault_and_state_of_the_wire_has_a_name_of_its_own) {
     std::set<std::string> faults, states;
     ols_status_reply status{};
     status.fault_slot = OLS_NO_SLOT;
-    for (status.fault = OLS_FAULT_NONE; status.fault <= OLS_FAULT_OVER_DUTY; status.fault++) {
+    for (status.fault = OLS_FAULT_NONE; status.fault <= OLS_FAULT_LIGHT_STUCK; status.fault++) {
         const std::string text = fault_text(status);
         EXPECT_EQ(text.find("unknown"), std::string::npos) << int(status.fault);
         faults.insert(text.substr(0, text.find(':')));
     }
-    EXPECT_EQ(faults.size(), size_t(OLS_FAULT_OVER_DUTY) + 1);
+    EXPECT_EQ(faults.size(), size_t(OLS_FAULT_LIGHT_STUCK) + 1);
     EXPECT_NE(fault_text(status).find("unknown_fault"), std::string::npos) << "of a later release";
     for (uint8_t state = OLS_STATE_IDLE; state <= OLS_STATE_WAITING; state++) states.insert(state_name(state));
     EXPECT_EQ(states.size(), size_t(OLS_STATE_WAITING) + 1);

@@ -2,6 +2,7 @@
 """The pin tables of the boards: made from one source, in step with what is committed, and refused when they cannot be right."""
 import copy
 import json
+import re
 import struct
 import subprocess
 import sys
@@ -70,7 +71,12 @@ def test_the_feathers_header_pins_are_those_of_its_schematic():
     (lambda b: b['outputs'].pop('PHOTO'), r'\[outputs\] must name'),
     (lambda b: b['outputs']['READY'].update(gpio=23), 'consecutive'),
     (lambda b: b.update(name='a_name_of_more_than_15'), 'longer than the 15 bytes'),
+    (lambda b: b['outputs'].pop('HEALTHY'), r'\[outputs\] must name'),
     (lambda b: b['shift'].update(chain_bits=257), '1 to 256'),
+    (lambda b: b['cables'].update(trigger_m=11), '0 to 10 m'),
+    (lambda b: b['cables'].update(trigger_m=-1), '0 to 10 m'),
+    (lambda b: b['cables'].update(tirgger_m=3), r'\[cables\] must name trigger_m'),
+    (lambda b: b['cables'].clear(), r'\[cables\] must name trigger_m'),
 ])
 def test_pins_that_no_firmware_could_drive_are_refused(pico, change, message):
     board_pins.check(pico)
@@ -78,6 +84,20 @@ def test_pins_that_no_firmware_could_drive_are_refused(pico, change, message):
     change(wrong)
     with pytest.raises(board_pins.BoardError, match=message):
         board_pins.check(wrong)
+
+
+@pytest.mark.parametrize('metres, ticks', [(0, 0), (0.5, 1), (0.8, 1), (0.81, 2), (3, 4), (10, 13)])
+def test_an_echo_takes_the_cable_there_and_back_in_whole_ticks(pico, metres, ticks):
+    pico['cables']['trigger_m'] = metres
+    assert f'BOARD_CABLE_TRIGGER_ECHO_TICKS = {ticks},' in board_pins.header(pico)
+
+
+@pytest.mark.parametrize('path', BOARDS, ids=BOARD_IDS)
+def test_what_ends_the_light_does_not_touch_healthy(path):
+    board = board_pins.read_board(path)
+    assert board['outputs']['HEALTHY']['gpio'] == 26
+    pins = re.search(r'BOARD_OUTPUT_PINS \{(.*?)\}', board_pins.header(board))[1].split(', ')
+    assert len(pins) == len(board['outputs']) - 2 and '26' not in pins
 
 
 def test_a_board_may_have_no_ready(pico):
@@ -89,7 +109,8 @@ def test_a_board_may_have_no_ready(pico):
 @pytest.mark.parametrize('path', BOARDS, ids=BOARD_IDS)
 def test_the_compiler_reads_the_header_as_the_source_says(path, tmp_path):
     board = board_pins.read_board(path)
-    names = ['DATA', 'CLK', 'LATCH', 'LIGHT_EN', 'TRIG0', 'SYNC', 'TIMELINE', 'STOP_INPUTS', 'GENLOCK', 'PHOTO']
+    names = ['DATA', 'CLK', 'LATCH', 'LIGHT_EN', 'TRIG0', 'SYNC', 'TIMELINE', 'STOP_INPUTS', 'GENLOCK', 'PHOTO',
+             'HEALTHY']
     program = tmp_path / 'print.c'
     (tmp_path / 'board_pins.h').write_text(board_pins.header(board))
     program.write_text('#include <stdio.h>\n#include "board_pins.h"\n'
@@ -103,7 +124,7 @@ def test_the_compiler_reads_the_header_as_the_source_says(path, tmp_path):
     pins.update(TIMELINE=pins['LATCH'], STOP_INPUTS=pins['ESTOP'])
     assert (name, gpios) == (path.stem, [pins[signal]['gpio'] for signal in names])
     assert {gpio for gpio in range(32) if mask >> gpio & 1} == \
-        {pin['gpio'] for signal, pin in board['outputs'].items() if signal != 'PHOTO'}  # which the other PIO block drives
+        {pin['gpio'] for signal, pin in board['outputs'].items() if signal not in ('PHOTO', 'HEALTHY')}  # which the other PIO block and the main loop drive
 
 
 @pytest.mark.parametrize('name', BOARD_IDS)

@@ -17,6 +17,7 @@ namespace {
 struct Machine {
     uint32_t surviving[3] = {0, 0, 0};
     bool reset_by_watchdog = false;
+    bool light_is_on = false;
     std::vector<std::string> calls;
     jmp_buf reset;
 } machine;
@@ -39,6 +40,9 @@ void board_recall(uint32_t words[3]) {
 }
 bool board_was_reset_by_watchdog(void) {
     return machine.reset_by_watchdog;
+}
+bool board_light_is_on(void) {
+    return machine.light_is_on;
 }
 void board_reset(void) {
     machine.calls.push_back("reset");
@@ -87,9 +91,21 @@ TEST_F(Fault, a_hang_while_playing_is_told_with_slot_and_tick_by_the_next_run) {
         fault_note_progress(slot, late_ticks);
         boot(true);
         expect_latched(OLS_FAULT_WATCHDOG, slot, late_ticks);
-        fault_clear();
+        EXPECT_TRUE(fault_clear());
         expect_latched(OLS_FAULT_NONE, OLS_NO_SLOT, 0);
     }
+}
+
+TEST_F(Fault, none_is_cleared_while_the_light_is_on_and_that_is_what_is_latched_instead) {
+    fault_latch(OLS_FAULT_EMERGENCY_STOP, 7, late_ticks);
+    machine.light_is_on = true;
+    EXPECT_FALSE(fault_clear());
+    expect_latched(OLS_FAULT_LIGHT_STUCK, OLS_NO_SLOT, 0);
+    EXPECT_FALSE(fault_clear());
+    expect_latched(OLS_FAULT_LIGHT_STUCK, OLS_NO_SLOT, 0);
+    machine.light_is_on = false;
+    EXPECT_TRUE(fault_clear());
+    expect_latched(OLS_FAULT_NONE, OLS_NO_SLOT, 0);
 }
 
 TEST_F(Fault, a_hang_while_nothing_played_is_told_without_slot_and_tick) {

@@ -129,12 +129,36 @@ TEST(Schedule, notices_the_very_trigger_that_is_off_by_more_than_the_tolerance_a
         int64_t end_ticks = 0;
         add_rises(*played, slots, 3, end_ticks, rises);
         const size_t wrong = 1 + pick() % (rises.size() - 1);
-        const int64_t slip_ticks = (4 + int64_t(pick() % 1000)) * (pick() % 2 ? 1 : -1);
+        const int64_t slip_ticks = (SCHEDULE_TOLERANCE_TICKS + 1 + int64_t(pick() % 1000)) * (pick() % 2 ? 1 : -1);
         const int64_t jitter_ticks = pick() % 2;  // a stamp is a floor to two ticks
         schedule_begin(played.get(), false);
         for (size_t n = 0; n < wrong; n++) ASSERT_TRUE(take(rises[n] + jitter_ticks * int64_t(n % 2)));
         EXPECT_FALSE(take(rises[wrong] + slip_ticks + (slip_ticks > 0 ? 1 : -1))) << slip_ticks;
     }
+}
+
+// One play of two triggers, the second off by `slip_ticks`; the first at an even or odd count of the witness.
+bool passes(int64_t first_ticks, int64_t slip_ticks) {
+    const Slots slots = {{OLS_BASIS, 1, 0, 0, 200, 5'000, 0}};
+    const auto played = sequence_of(slots, 0, 0, 0);
+    schedule_begin(played.get(), false);
+    EXPECT_TRUE(take(first_ticks));
+    return take(first_ticks + 5'000 + slip_ticks);
+}
+
+TEST(Schedule, lets_pass_what_an_echo_of_the_stated_cable_does_to_an_edge_and_nothing_a_tick_beyond_the_tolerance) {
+    // 3 m of 5 ns there and back are 30 ns, 4 ticks of 8 ns.
+    EXPECT_EQ(BOARD_CABLE_TRIGGER_ECHO_TICKS, 4);
+    EXPECT_EQ(SCHEDULE_TOLERANCE_TICKS, 7);
+    for (const int64_t first_ticks : {0, 1})
+        for (const int64_t sign : {-1, 1})
+            for (int64_t ticks = 0; ticks <= BOARD_CABLE_TRIGGER_ECHO_TICKS + 1; ticks++)
+                EXPECT_TRUE(passes(first_ticks, sign * ticks)) << "late by the echo, and by the synchroniser's tick";
+    // The witness begins to count at an odd tick of this test: from there stamps of an even distance are exact.
+    EXPECT_TRUE(passes(1, SCHEDULE_TOLERANCE_TICKS));
+    EXPECT_FALSE(passes(1, SCHEDULE_TOLERANCE_TICKS + 1));
+    EXPECT_TRUE(passes(0, -SCHEDULE_TOLERANCE_TICKS));
+    EXPECT_FALSE(passes(0, -SCHEDULE_TOLERANCE_TICKS - 1));
 }
 
 TEST(Schedule, begins_anew_with_each_cycle_that_waits_but_holds_within_it) {
@@ -149,7 +173,8 @@ TEST(Schedule, begins_anew_with_each_cycle_that_waits_but_holds_within_it) {
             add_rises(*played, slots, 1, begin_ticks, rises);
             for (size_t n = 0; n < rises.size(); n++) {
                 const bool slips = cycle == 3 && n + 1 == rises.size();
-                ASSERT_EQ(take(rises[n] + (slips ? 6 : 0)), !slips) << "round " << round << ", cycle " << cycle;
+                ASSERT_EQ(take(rises[n] + (slips ? SCHEDULE_TOLERANCE_TICKS + 3 : 0)), !slips)
+                    << "round " << round << ", cycle " << cycle;
                 ASSERT_EQ(schedule_ticks_to_next(), n + 1 < rises.size() ? uint32_t(rises[n + 1] - rises[n]) : 0u)
                     << "nothing is due while an edge is waited for";
             }

@@ -2,6 +2,7 @@
 // Every way in which the board without hardware ends dark, and what it refuses to light at all.
 // links: ols_firmware
 #include "link_fixture.hpp"
+#include "schedule.h"
 
 using namespace ols::test;
 
@@ -34,6 +35,17 @@ TEST_F(Stops, a_late_trigger_is_a_fault) {
     play();
     board_host_run_us(10'000);
     board_host_delay_triggers(40);
+    board_host_run_us(2'000);
+    expect_fault(OLS_FAULT_SLIPPED);
+}
+
+TEST_F(Stops, a_trigger_that_is_late_by_no_more_than_the_cables_echo_is_none) {
+    play();
+    board_host_run_us(10'000);
+    board_host_delay_triggers(BOARD_CABLE_TRIGGER_ECHO_TICKS);
+    board_host_run_us(2'000);
+    EXPECT_EQ(status().state, OLS_STATE_PLAYING);
+    board_host_delay_triggers(SCHEDULE_TOLERANCE_TICKS + 2);
     board_host_run_us(2'000);
     expect_fault(OLS_FAULT_SLIPPED);
 }

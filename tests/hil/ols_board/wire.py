@@ -13,7 +13,7 @@ BASIS, TRACKING, MATTE, DARK = range(4)
 NEXT_NONE, NEXT_LOADING, NEXT_READY, NEXT_SWAPPING = range(4)
 IDLE, LOADED, ARMED, PLAYING, DONE, FAULT, WAITING = range(7)
 FAULTS = ("none", "timeline starved", "shifter starved", "slipped", "host lost", "watchdog", "processor", "bad memory",
-          "emergency stop", "over-temperature", "open lamp", "heartbeat", "over-duty")
+          "emergency stop", "over-temperature", "open lamp", "heartbeat", "over-duty", "light stuck")
 ERROR_BAD_STATE, ERROR_BAD_OFFSET, ERROR_BAD_CRC, ERROR_FAULT_LATCHED, ERROR_OVER_LIMIT, ERROR_NOT_SAFE = 3, 4, 5, 7, 8, 9
 
 HELLO_REPLY = struct.Struct("<Q24s8sIIIHHIIHHII16s")

@@ -83,7 +83,7 @@ async function main() {
   await stage?.end();
   if (options.stats) {
     const statistics = { ...pacer.statistics, ...board.handlerTimes, boot: board.boot, dropped: stage?.dropped ?? 0,
-                         violations: violations.list };
+                         can: board.canTiming, violations: violations.list };
     process.stderr.write(`${JSON.stringify(statistics)}\n`);
   }
   if (violations.list.length > 0) process.exitCode = EXIT_VIOLATION;

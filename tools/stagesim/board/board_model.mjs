@@ -26,6 +26,7 @@ export class Board {
   #inputs; // levels from outside, by GPIO
   #boot; // ticks since the last reset at which what was reached first, and why it began
   #oscillators = new Map(); // ticks of half a period, by GPIO
+  #shorts = new Map(); // levels of shorted pads, by GPIO
 
   /**
    * @param {object} image from readImage
@@ -97,6 +98,11 @@ export class Board {
     return { cause: this.#boot.cause, boots: this.#boots, driven_us: us(this.#boot.driven), attached_us: us(this.#boot.attached) };
   }
 
+  /** The CAN controller's bit timing as it is set, null without one. */
+  get canTiming() {
+    return this.#can?.bitTiming ?? null;
+  }
+
   /** True if PIO and DMA do nothing by themselves and the bus is idle. */
   get quiet() {
     return this.#parts.lockstep.quiet && !this.usbHost.active && !this.#can?.bus.busy;
@@ -165,6 +171,12 @@ export class Board {
     change.schedule(this.#oscillators.get(gpio) * TICK_NS);
   }
 
+  /** Shorts a pad of the board to a level, whatever drives it; null takes the short away. */
+  short(gpio, level) {
+    this.#shorts.set(gpio, level); // and again after a reset
+    this.#parts.pads.short(gpio, level);
+  }
+
   unplug() {
     this.usbHost.unplug();
     this.#options.onUnplug();
@@ -190,6 +202,7 @@ export class Board {
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.chip.usbCtrl.busyHub = this.#options.busyHub ?? false;
     for (const gpio of this.#oscillators.keys()) this.#startOscillator(gpio);
+    for (const [gpio, level] of this.#shorts) this.#parts.pads.short(gpio, level);
     this.usbHost = new UsbHost(this.chip.clock, this.chip.usbCtrl, this.#options.log);
     this.#can?.attach(this.chip);
   }

@@ -29,6 +29,7 @@ export class ExposureRecorder {
     this.#triggers = pins.triggers;
     this.#open = pins.triggers.map(() => null);
     this.#activeLow = activeLow.reduce((mask, trigger) => mask | (1 << pins.triggers[trigger]), 0);
+    this.#levels = this.#activeLow; // all pads are low; what is active from the start has no begin, and is no exposure
     this.#chain = new Chain(chainBits);
     this.#emit = emit;
   }
@@ -63,6 +64,7 @@ export class ExposureRecorder {
       return;
     }
     const exposure = this.#open[trigger];
+    if (exposure === null) return;
     this.#open[trigger] = null;
     if (this.#levels & (1 << this.#outputs.LIGHT_EN)) addSegment(exposure, this.#litSince, tick, this.#chain.pattern);
     exposure.fall = tick;

@@ -30,13 +30,16 @@ const FAULTS = {
   genlockclock: (board, ticks) => board.oscillate(board.pins.genlock, ticks),
   openlampclock: (board, ticks) => board.oscillate(board.pins.stopInputs.OPEN_LAMP, ticks),
   canclock: (board, ticks) => board.oscillate(board.pins.can.pins.CAN_INTERRUPT, ticks),
+  short: (board, gpio, level) => board.short(gpio, level === 1),
+  unshort: (board, gpio) => board.short(gpio, null),
   release: (board) => Object.values(board.pins.stopInputs).forEach((gpio) => board.drive(gpio, true)),
 };
 /** How many numbers a fault takes, at least and at most, and what each must be below; none where it is not here. */
 const NUMBERS = { starve: { least: 0, below: [12] }, upset: { least: 1, below: [32] },
                   genlockclock: { least: 1, below: [1e9] }, openlampclock: { least: 1, below: [1e9] },
                   canclock: { least: 1, below: [1e9] },
-                  flip: { least: 2, below: [0x20042000, 8] } };
+                  flip: { least: 2, below: [0x20042000, 8] }, short: { least: 2, below: [30, 2] },
+                  unshort: { least: 1, below: [30] } };
 
 /**
  * @param {string} text FAULT[:NUMBER...]@TICK, FAULT[:NUMBER...]@trigger:N or the latter with +TICKS

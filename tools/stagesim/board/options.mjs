@@ -33,8 +33,10 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
                       reset, watchdog, hardfault; hang: the main program stops, lockup: handlers, too; starve: DMA,
                       or starve:CHANNEL; flip:ADDRESS:BIT of memory, upset:BIT of the timeline's counter; unplug,
                       suspend and busreset of USB; sleep and resume of its host; buserror garbles the next bulk IN,
-                      fatalbuserror so that the controller locks up (RP2040-E15), usblockup locks it up at once; estop, overtemperature, openlamp pull that input low, release
-                      lets all go high; genlock and genlockfall are edges of that input
+                      fatalbuserror so that the controller locks up (RP2040-E15), usblockup locks it up at once; estop,
+                      overtemperature, openlamp pull that input low, release lets all go high; genlock and genlockfall
+                      are edges of that input; genlockclock:TICKS, openlampclock:TICKS and canclock:TICKS let an input
+                      change that often; short:GPIO:LEVEL of a pad, whatever drives it, unshort:GPIO
   --stats             print ticks, speed, dropped lines and violations as JSON at the end
   --help
 

@@ -45,6 +45,10 @@ export class CanBoard {
     };
   }
 
+  get bitTiming() {
+    return this.#controller.bitTiming;
+  }
+
   /** The board's pins have changed. A pin that nobody drives is pulled to rest by the module. */
   pinsChanged(levels, driven) {
     const { CAN_CS, CAN_RESET } = this.#pins;

@@ -239,14 +239,24 @@ export class Mcp2515 {
     return this.transmitErrors > 127 || this.receiveErrors > 127;
   }
 
-  /** From CNF1..3 (chapter 5); 0 while not on the bus. */
+  /** The parts of a bit from CNF1..3 (chapter 5): a quantum in ns, and how many of it the segments after the first have. */
+  get bitTiming() {
+    const [cnf3, cnf2, cnf1] = this.#registers.subarray(ADDRESS.CNF3, ADDRESS.CNF1 + 1);
+    const phase1 = (cnf2 >> 3 & 7) + 1;
+    return {
+      quantum_ns: 2e9 * ((cnf1 & 0x3f) + 1) / OSCILLATOR_HZ,
+      jump: (cnf1 >> 6) + 1,
+      propagation: (cnf2 & 7) + 1,
+      phase1,
+      phase2: cnf2 & 0x80 ? (cnf3 & 7) + 1 : Math.max(phase1, 2), // BTLMODE; information processing time
+    };
+  }
+
+  /** 0 while not on the bus. */
   get bitRate() {
     if ((this.#mode !== MODE.NORMAL && this.#mode !== MODE.LISTEN_ONLY) || this.#busOff) return 0;
-    const [cnf3, cnf2, cnf1] = this.#registers.subarray(ADDRESS.CNF3, ADDRESS.CNF1 + 1);
-    const propagation = (cnf2 & 7) + 1;
-    const phase1 = (cnf2 >> 3 & 7) + 1;
-    const phase2 = cnf2 & 0x80 ? (cnf3 & 7) + 1 : Math.max(phase1, 2); // BTLMODE; information processing time
-    return OSCILLATOR_HZ / (2 * ((cnf1 & 0x3f) + 1)) / (1 + propagation + phase1 + phase2);
+    const { quantum_ns, propagation, phase1, phase2 } = this.bitTiming;
+    return 1e9 / quantum_ns / (1 + propagation + phase1 + phase2);
   }
 
   /** The highest priority first, and among equals the highest buffer (3.3). */

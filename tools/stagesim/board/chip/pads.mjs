@@ -24,6 +24,8 @@ export class Pads {
   #pulledUp = 0;
   #externalMask = 0;
   #externalLevels = 0;
+  #shortedMask = 0;
+  #shortedLevels = 0;
   // The last levels of the inputs, newest first: from which cycle on, and what. An edge a cycle at most, so that
   // three entries reach behind the synchroniser.
   #history = [{ from: 0, inputs: 0 }, { from: -1, inputs: 0 }, { from: -2, inputs: 0 }, { from: -3, inputs: 0 }];
@@ -95,6 +97,14 @@ export class Pads {
     this.update(this.#time.cycle);
   }
 
+  /** Shorts a pad to a level, stronger than any output of the chip; null takes the short away. */
+  short(gpio, level) {
+    const bit = 1 << gpio;
+    this.#shortedMask = level === null ? this.#shortedMask & ~bit : this.#shortedMask | bit;
+    this.#shortedLevels = level ? this.#shortedLevels | bit : this.#shortedLevels & ~bit;
+    this.update(this.#time.cycle);
+  }
+
   /** Whether a machine or the processor sees `gpio` high in `cycle`. */
   seen(gpio, cycle, bypass) {
     return ((this.seenAll(cycle, bypass) >> gpio) & 1) === 1;
@@ -135,7 +145,9 @@ export class Pads {
     out = ((out ^ made.invert) & ~made.low) | made.high;
     driven = ((driven ^ made.turn) | made.enable) & ~made.disable;
     const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
-    const levels = (out & driven) | (idle & ~driven);
+    const free = (out & driven) | (idle & ~driven);
+    const levels = (free & ~this.#shortedMask) | this.#shortedLevels;
+    driven |= this.#shortedMask;
     const { invert, low, high } = this.#inputOverrides;
     const inputs = (((levels & this.#enabledInputs) ^ invert) & ~low) | high;
     if (inputs !== this.#history[0].inputs) this.#inputsChange(cycle, inputs);

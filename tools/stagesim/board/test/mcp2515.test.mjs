@@ -128,14 +128,23 @@ describe('the controller', () => {
     assert.equal(read(0x36), 0xaa);
   });
   test('bit rates follow from oscillator, prescaler and segments (chapter 5)', () => {
-    // 8 quanta of 125 and 250 ns; 16 of 125 ns; 16 of 500 ns, which section 5 has as its example at 125 kbit/s
-    for (const [cnf1, cnf2, cnf3, rate] of [[0x00, 0x91, 0x01, 1e6], [0x01, 0x91, 0x01, 5e5], [0x00, 0xbb, 0x02, 5e5],
+    // 8 quanta of 125 and 250 ns, with the propagation segment's share of 2 or 4; 16 of 125 ns; 16 of 500 ns, which section 5 has as its example at 125 kbit/s
+    for (const [cnf1, cnf2, cnf3, rate] of [[0x00, 0x91, 0x01, 1e6], [0x00, 0x83, 0x01, 1e6], [0x01, 0x91, 0x01, 5e5], [0x00, 0xbb, 0x02, 5e5],
                                             [0x03, 0xb1, 0x05, 125e3]]) {
       write(0x0f, 0x80);
       write(0x28, cnf3, cnf2, cnf1);
       write(0x0f, 0x00);
       assert.equal(chip.bitRate, rate);
     }
+  });
+  test('the segments of a bit are those of registers 5-1 to 5-3', () => {
+    write(0x0f, 0x80);
+    write(0x28, 0x01, 0x83, 0x40);
+    assert.deepEqual(chip.bitTiming, { quantum_ns: 125, jump: 2, propagation: 4, phase1: 1, phase2: 2 });
+    write(0x28, 0x02, 0xbb, 0x01);
+    assert.deepEqual(chip.bitTiming, { quantum_ns: 250, jump: 1, propagation: 4, phase1: 8, phase2: 3 });
+    write(0x28, 0x02, 0x3b, 0x01);
+    assert.equal(chip.bitTiming.phase2, 8, 'as phase 1 without BTLMODE');
   });
   test('a frame is sent from a buffer and takes its bits on the bus', () => {
     join();

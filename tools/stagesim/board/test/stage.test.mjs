@@ -38,9 +38,9 @@ describe('the chain', () => {
 
 describe('exposures', () => {
   /** Plays [tick, pin, level] edges on a chain of 8 bits; returns the exposures. */
-  function record(edges) {
+  function record(edges, activeLow = []) {
     const exposures = [];
-    const recorder = new ExposureRecorder(8, (exposure) => exposures.push(exposure), pico);
+    const recorder = new ExposureRecorder(8, (exposure) => exposures.push(exposure), pico, activeLow);
     let levels = 0;
     for (const [tick, pin, level] of edges) {
       levels = level ? levels | (1 << PINS[pin]) : levels & ~(1 << PINS[pin]);
@@ -73,6 +73,12 @@ describe('exposures', () => {
                               [160, 'TRIG0', 1], [160, 'LIGHT_EN', 1], [170, 'TRIG0', 0]]);
     assert.deepEqual(exposures.map(({ trigger, segments }) => [trigger, segments]),
                      [[1, []], [0, [{ on: 160, off: 170, bits: '0f' }]]]);
+  });
+
+  test('an active-low trigger that is low before its idle level exposes nothing, whatever other pins do', () => {
+    const exposures = record([[10, 'HEALTHY', 1], [20, 'HEALTHY', 0], [30, 'TRIG0', 1], [40, 'TRIG0', 0], [50, 'HEALTHY', 1],
+                              [60, 'TRIG0', 1]], [0]);
+    assert.deepEqual(exposures.map(({ rise, fall }) => [rise, fall]), [[40, 60]]);
   });
 
   test('data that changes with the clock comes too late for it', () => {
