@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One DMA channel: its registers under four names, its transfers a cycle each (RP2040 datasheet 2.5.1 to 2.5.7).
 
+import { BusFault } from './bus.mjs';
+
 export const CYCLE_NS = 8;
 const ABORT_CYCLES = 4; // until an abort is over: in-flight transfers retire (2.5.5.3)
 
@@ -155,29 +157,50 @@ export class DmaChannel {
     const { ctrl, size, ringMask } = this;
     if (this.readAddr % size !== 0) return this.#halt(READ_ERROR, 'READ_ADDR');
     if (this.writeAddr % size !== 0) return this.#halt(WRITE_ERROR, 'WRITE_ADDR');
-    this.#move(size);
+    const error = this.#move(size);
+    if (error !== 0) return this.#stop(error); // the bus has told of it
     if (ctrl & INCR_READ) this.readAddr = advance(this.readAddr, size, ctrl & RING_WRITES ? 0xffffffff : ringMask);
     if (ctrl & INCR_WRITE) this.writeAddr = advance(this.writeAddr, size, ctrl & RING_WRITES ? ringMask : 0xffffffff);
     if (--this.count === 0) this.#complete();
     else this.schedule();
   }
 
+  /** @returns {number} the flag of the error that the bus has answered with, 0 without one */
   #move(size) {
-    const { rp2040 } = this.dma;
-    if (size === 4) {
-      const word = rp2040.readUint32(this.readAddr);
-      rp2040.writeUint32(this.writeAddr, this.ctrl & BSWAP ? swapBytes(word) : word);
-    } else if (size === 2) {
-      const half = rp2040.readUint16(this.readAddr);
-      rp2040.writeUint16(this.writeAddr, this.ctrl & BSWAP ? ((half & 0xff) << 8) | (half >> 8) : half);
-    } else {
-      rp2040.writeUint8(this.writeAddr, rp2040.readUint8(this.readAddr));
+    let error = READ_ERROR;
+    try {
+      const value = this.#fetch(size);
+      error = WRITE_ERROR;
+      this.#store(size, value);
+      return 0;
+    } catch (fault) {
+      if (!(fault instanceof BusFault)) throw fault;
+      return error;
     }
+  }
+
+  #fetch(size) {
+    const { rp2040 } = this.dma;
+    if (size === 4) return this.ctrl & BSWAP ? swapBytes(rp2040.readUint32(this.readAddr)) : rp2040.readUint32(this.readAddr);
+    if (size === 1) return rp2040.readUint8(this.readAddr);
+    const half = rp2040.readUint16(this.readAddr);
+    return this.ctrl & BSWAP ? ((half & 0xff) << 8) | (half >> 8) : half;
+  }
+
+  #store(size, value) {
+    const { rp2040 } = this.dma;
+    if (size === 4) rp2040.writeUint32(this.writeAddr, value);
+    else if (size === 2) rp2040.writeUint16(this.writeAddr, value);
+    else rp2040.writeUint8(this.writeAddr, value);
   }
 
   /** A bus error ends the sequence, sets its flag and always raises the interrupt (2.5.7, AHB_ERROR). Nothing is chained. */
   #halt(error, name) {
     this.#note('2.5.1', `${name} is not aligned to DATA_SIZE: a bus error, the channel halts`);
+    this.#stop(error);
+  }
+
+  #stop(error) {
     this.errors |= error;
     this.busy = false;
     this.dma.raise(this.index);

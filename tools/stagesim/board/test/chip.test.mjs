@@ -85,6 +85,19 @@ describe('bus (2.1, 2.2; ARMv6-M A3.2.1)', () => {
     assert.equal(b.lockstep.awakeCycles < 100, true);
   });
 
+  test('a DMA channel that the bus answers with an error halts with its flag, and nobody is chained (2.5.7)', () => {
+    for (const [from, to, flag] of [[0x30000000, SRAM + 0x800, 1 << 30], [SRAM + 0x800, 0x60000000, 1 << 29]]) {
+      const b = new Bench();
+      b.write(0x50000000, from);
+      b.write(0x50000004, to);
+      b.write(0x50000008, 4);
+      b.write(0x5000000c, (0x3f << 15) | (2 << 2) | 1);
+      b.run(20);
+      assert.equal(b.read(0x50000010) & ((7 << 29) | (1 << 24)), (0x80000000 | flag) | 0);
+      assert.equal(b.read(0x50000008), 4);
+    }
+  });
+
   test('nothing is executed from where peripherals are (ARMv6-M B3.1)', () => {
     const b = new Bench();
     b.chip.writeUint32(SRAM + 12, (SRAM + 0x200) | 1);
