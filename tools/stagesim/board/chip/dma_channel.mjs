@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // One DMA channel: its registers under four names, its transfers a cycle each (RP2040 datasheet 2.5.1 to 2.5.7).
-
 import { BusFault } from './bus.mjs';
 
 export const CYCLE_NS = 8;
