@@ -57,7 +57,7 @@ def test_it_changes_often_enough_idle_in_a_long_upload_armed_playing_and_in_a_da
     pass_time(link, 50_000)
     board.stop()
     ticks = beats(board)
-    assert ticks[0] < 5 * MS
+    assert ticks[0] < 110 * MS  # 0_boot.py
     assert max(gaps(ticks, 0, ticks[-1])) <= CHANGE_TICKS_MAX
     (at, _), = injected(board, {"estop"})
     assert ticks[-1] - at > 40 * MS, "in the fault, too"

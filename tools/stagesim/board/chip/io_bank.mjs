@@ -19,7 +19,6 @@ const CLOCK_PINS = new Set([20, 21, 22, 23, 24, 25]);
 const USB_DP = 15; // and there the USB controller's D+, by the work-around of erratum RP2040-E5
 const PAD_RESET = 0x56; // input enabled, pulled down, Schmitt trigger, 4 mA
 const PAD_FIELDS = 0xff;
-const BUS_KEEPER = 0x0c;
 const SWCLK = 0x7c;
 const SWD = 0x80;
 
@@ -160,7 +159,6 @@ export class PadsBank extends BasePeripheral {
     } else if (offset === SWCLK || offset === SWD) {
       this.debugPads[(offset - SWCLK) >> 2] = value & PAD_FIELDS;
     } else {
-      if ((value & BUS_KEEPER) === BUS_KEEPER) this.rp2040.violations.note('2.19.4', `GPIO ${pin.index}: the bus keeper is not modelled`);
       pin.padValue = value & PAD_FIELDS;
       pin.checkForUpdates();
     }

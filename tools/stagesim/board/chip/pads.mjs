@@ -22,6 +22,7 @@ export class Pads {
   #enabledInputs = 0;
   #inputOverrides = { invert: 0, low: 0, high: 0 };
   #pulledUp = 0;
+  #kept = 0; // pulled up and down: the pad keeps its level (2.19.4)
   #externalMask = 0;
   #externalLevels = 0;
   #shortedMask = 0;
@@ -144,9 +145,10 @@ export class Pads {
       (sio.gpioOutputEnable & sources.sio);
     out = ((out ^ made.invert) & ~made.low) | made.high;
     driven = ((driven ^ made.turn) | made.enable) & ~made.disable;
-    const idle = (this.#externalLevels & this.#externalMask) | (this.#pulledUp & ~this.#externalMask);
-    const free = (out & driven) | (idle & ~driven);
-    const levels = (free & ~this.#shortedMask) | this.#shortedLevels;
+    const free = (this.#pulledUp & ~this.#kept) | (this.levels & this.#kept);
+    const idle = (this.#externalLevels & this.#externalMask) | (free & ~this.#externalMask);
+    const unshorted = (out & driven) | (idle & ~driven);
+    const levels = (unshorted & ~this.#shortedMask) | this.#shortedLevels;
     driven |= this.#shortedMask;
     const { invert, low, high } = this.#inputOverrides;
     const inputs = (((levels & this.#enabledInputs) ^ invert) & ~low) | high;
@@ -186,6 +188,7 @@ export class Pads {
     const inputOverrides = { invert: 0, low: 0, high: 0 };
     let enabledInputs = 0;
     let pulledUp = 0;
+    let kept = 0;
     for (let n = 0; n < GPIO_COUNT; n++) {
       const bit = 1 << n;
       const pin = this.#chip.gpio[n];
@@ -201,11 +204,13 @@ export class Pads {
       const inKind = OVERRIDES[pin.inputOverride];
       if (inKind) inputOverrides[inKind] |= bit;
       if (pin.pullupEnabled) pulledUp |= bit;
+      if (pin.pullupEnabled && pin.pulldownEnabled) kept |= bit;
     }
     this.#sources = sources;
     this.#overrides = overrides;
     this.#enabledInputs = enabledInputs;
     this.#inputOverrides = inputOverrides;
     this.#pulledUp = pulledUp;
+    this.#kept = kept;
   }
 }
