@@ -120,7 +120,7 @@ def inputs_table():
 def pump_table():
     yield '| figure | formula | value |'
     yield '| --- | --- | --- |'
-    yield f'| gate with a change each 2 ms | a r d / (1 - (1 - r) d): a = {PUMP_VOLTS[0]:.2f} V, r = C1 / (C1 + C2), d = exp(-4 ms / R C2) | {pump_least(4e-3):.2f} V at least |'
+    yield f'| gate with a change each 2.5 ms | a r d / (1 - (1 - r) d): a = {PUMP_VOLTS[0]:.2f} V, r = C1 / (C1 + C2), d = exp(-5 ms / R C2) | {pump_least(5e-3):.2f} V at least |'
     yield f'| last change to gate off | R C2 ln({PUMP_VOLTS[1]:.2f} V / {GATE_OFF} V) | {pump_off_ms():.0f} ms at most |'
     yield '| gate at a constant level | no charge through C1 | 0 V after the same time |'
 

@@ -12,7 +12,7 @@ import pytest
 
 import check_trace
 from ols_board import board as board_of
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import BoardError
 from ols_board.program import CHAIN_BITS, EXPOSURE_TICKS, PERIOD_TICKS, paper_program
 from ols_board.stops import LIT, MS, injected, wait_for_fault
@@ -94,9 +94,9 @@ def dark_from(changes, tick, within=23 * MS):
     return last
 
 
-def report(name, cause_to_dark):
-    print(f"{name:34} {len(cause_to_dark):3} times, dark at most {max(cause_to_dark):8} ticks, "
-          f"{max(cause_to_dark) / 125:.2f} us, after its cause")
+def report(name, cause_to_dark, claim=claims.counted):
+    claim(f"{name}: {len(cause_to_dark)} times, dark at most {max(cause_to_dark)} ticks, {max(cause_to_dark) / 125:.2f} us, "
+          "after its cause")
 
 
 def causes(told):
@@ -294,7 +294,8 @@ def test_a_starved_feed_is_dark_in_the_tick_in_which_its_next_word_was_due(emula
                PERIOD_TICKS - 12, PERIOD_TICKS]
         dark_after.append(min(into - tick for tick in due if tick <= into) if channel == 0 else into)
     assert max(dark_after) <= (0 if channel == 0 else HANDLER_TICKS_MAX)
-    report(f"starve:{channel}: {cause}", dark_after)
+    by_pio = cause == "timeline starved"
+    report(f"starve:{channel}: {cause}", dark_after, claims.measured if by_pio else claims.counted)
 
 
 def sequence_words_address():
@@ -327,7 +328,7 @@ def test_program_memory_that_is_damaged_in_play_is_noticed_within_one_reading_of
             assert cause == "bad memory" or part != "patterns" and cause in ("slipped", "over-duty", "timeline starved")
             turns = -(-(loaded_bytes + 18 * 32) // 256) + 1
             assert dark_from(lit_changes(board), at) - at <= 2 * turns * MS
-            print(f"flip in {part}: {cause}, dark {(dark_from(lit_changes(board), at) - at) / MS:.2f} ms after it")
+            claims.counted(f"flip in {part}: {cause}, dark {(dark_from(lit_changes(board), at) - at) / MS:.2f} ms after it")
 
 
 def test_damage_between_upload_and_arming_lights_nothing(emulated):
@@ -377,6 +378,6 @@ def test_no_handler_took_longer_than_its_instructions_were_counted_to_take(emula
         for number, times in board.stop()["handlers"].items():
             taken[int(number)] = max(taken.get(int(number), 0), times["longest"])
     for number, name in numbers.items():
-        counted = count_cycles.ENTRY_CYCLES + counter.longest(name)
-        print(f"{name}: {taken[number]} cycles taken, {counted} counted")
-        assert 0 < taken[number] <= counted
+        bound = count_cycles.ENTRY_CYCLES + counter.longest(name)
+        claims.counted(f"{name}: {taken[number]} cycles taken, {bound} counted at most")
+        assert 0 < taken[number] <= bound

@@ -6,7 +6,7 @@ import pytest
 
 import check_trace
 from ols_board import board as board_of
-from ols_board import wire
+from ols_board import claims, wire
 from ols_board.board import BoardError
 from ols_board.program import CHAIN_BITS, EXPOSURE_TICKS, PERIOD_TICKS, paper_program
 from ols_board.stops import MS, injected
@@ -61,8 +61,8 @@ def test_it_changes_often_enough_idle_in_a_long_upload_armed_playing_and_in_a_da
     assert max(gaps(ticks, 0, ticks[-1])) <= CHANGE_TICKS_MAX
     (at, _), = injected(board, {"estop"})
     assert ticks[-1] - at > 40 * MS, "in the fault, too"
-    print(f"HEALTHY: {len(ticks)} changes, at most {max(gaps(ticks, 0, ticks[-1])) / 125:.0f} us apart, "
-          f"at least {min(gaps(ticks, 0, ticks[-1])) / 125:.1f} us")
+    claims.counted(f"HEALTHY: {len(ticks)} changes, at most {max(gaps(ticks, 0, ticks[-1])) / 125:.0f} us apart, "
+                   f"at least {min(gaps(ticks, 0, ticks[-1])) / 125:.1f} us")
 
 
 @pytest.mark.parametrize("injection, within_ticks, silent_until", [

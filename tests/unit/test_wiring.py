@@ -77,9 +77,9 @@ def gate(changes_s, end_s, tau=None, pump_volts=wiring.PUMP_VOLTS[0]):
 
 
 def test_the_gate_stays_on_at_the_lowest_rate_and_a_constant_level_or_a_single_edge_does_not_hold_it():
-    found = gate([n * 2e-3 for n in range(500)], 1.0)
-    assert min(found[len(found) // 2 :]) == pytest.approx(wiring.pump_least(4e-3), rel=0.01)
-    assert wiring.pump_least(4e-3) >= wiring.GATE_ON
+    found = gate([n * 2.5e-3 for n in range(400)], 1.0)
+    assert min(found[len(found) // 2 :]) == pytest.approx(wiring.pump_least(5e-3), rel=0.01)
+    assert wiring.pump_least(5e-3) >= wiring.GATE_ON
     assert max(gate([], 0.1)) == 0 and gate([0], 0.1)[-1] < wiring.GATE_OFF
 
 
