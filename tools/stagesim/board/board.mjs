@@ -45,6 +45,7 @@ async function main() {
     uniqueId: options.boardId,
     roscHz: options.roscHz,
     crystal_ms: options.crystal_ms,
+    sioOut: options.sioOut,
     injections: options.inject,
     log,
     onEdge: (tick, levels) => {
@@ -82,7 +83,7 @@ async function main() {
   vcd?.close(board.tick);
   await stage?.end();
   if (options.stats) {
-    const statistics = { ...pacer.statistics, ...board.handlerTimes, boot: board.boot, dropped: stage?.dropped ?? 0,
+    const statistics = { ...pacer.statistics, ...board.handlerTimes, boot: board.boot, pads: board.padDrives, dropped: stage?.dropped ?? 0,
                          can: board.canTiming, violations: violations.list };
     process.stderr.write(`${JSON.stringify(statistics)}\n`);
   }

@@ -39,6 +39,7 @@ export class Board {
    * @param {Uint8Array} options.uniqueId of the flash chip
    * @param {number} options.roscHz of the ring oscillator, from which it boots
    * @param {number} options.crystal_ms that the crystal takes to swing
+   * @param {number} options.sioOut what SIO's GPIO_OUT holds at the start
    * @param {object[]} options.injections from parseInjection
    * @param {import('./can/can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
    * @param {import('./chip/violations.mjs').Violations} options.violations
@@ -96,6 +97,12 @@ export class Board {
   get boot() {
     const us = (cycle) => (cycle === null ? null : Math.round(cycle / TICKS_PER_US));
     return { cause: this.#boot.cause, boots: this.#boots, driven_us: us(this.#boot.driven), attached_us: us(this.#boot.attached) };
+  }
+
+  /** Of each output of the board, how strongly its pad drives, in mA (datasheet 2.19.6.3, DRIVE). */
+  get padDrives() {
+    const drive_mA = (gpio) => [2, 4, 8, 12][(this.chip.gpio[gpio].padValue >> 4) & 3];
+    return Object.fromEntries(Object.entries(this.pins.outputs).map(([signal, gpio]) => [signal, drive_mA(gpio)]));
   }
 
   /** The CAN controller's bit timing as it is set, null without one. */
@@ -199,6 +206,7 @@ export class Board {
       this.#edge(this.#epoch + cycle, levels & driven & this.pins.mask);
     };
     this.#boot = { cause, driven: null, attached: null };
+    if (cause === Cause.POWER) this.chip.sio.gpioValue = this.#options.sioOut ?? 0;
     for (const [gpio, level] of this.#inputs) this.#parts.pads.drive(gpio, level);
     this.chip.usbCtrl.busyHub = this.#options.busyHub ?? false;
     for (const gpio of this.#oscillators.keys()) this.#startOscillator(gpio);

@@ -13,6 +13,7 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --flash-as-is       take an image that the boot ROM would not start: the board is then in its boot loader
   --rosc-mhz F        of the ring oscillator from which it boots, 1.8 to 12 (default 6.5)
   --crystal-ms F      that the crystal takes to swing (default 6)
+  --sio-out N         what SIO's GPIO_OUT holds at the start, as a debugger that resets nothing may leave it (default 0)
   --usb SOCKET        listen there for a USB client (docs/architecture.md, "USB transfers over a socket")
   --busy-hub          on the cable's hub, other devices' packets never leave the bus idle
   --chip-revision R   the chip's stepping: b0, b1 or b2 (default b2)
@@ -60,7 +61,7 @@ export function parseOptions(args) {
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
         'active-low': { type: 'string', multiple: true, default: [] }, stats: flag, help: flag, 'flash-as-is': flag,
-        'rosc-mhz': { ...text, default: '6.5' }, 'crystal-ms': { ...text, default: '6' },
+        'rosc-mhz': { ...text, default: '6.5' }, 'crystal-ms': { ...text, default: '6' }, 'sio-out': { ...text, default: '0' },
       },
     }));
   } catch (error) {
@@ -82,6 +83,7 @@ export function parseOptions(args) {
     canBitRate: 1000 * integer('--can-kbit-s', values['can-kbit-s'], 1),
     seed: integer('--seed', values.seed, 0),
     roscHz: 1e6 * number('--rosc-mhz', values['rosc-mhz'], 1.8, 12),
+    sioOut: integer('--sio-out', values['sio-out'], 0),
     crystal_ms: number('--crystal-ms', values['crystal-ms'], 0, 1e6),
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
     activeLow: values['active-low'].map((text) => trigger(text)),

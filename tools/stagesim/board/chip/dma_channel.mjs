@@ -105,6 +105,9 @@ export class DmaChannel {
     if (this.busy && value & EN && ((value ^ this.ctrl) & SETTINGS & ~EN) !== 0) {
       this.#note('2.5.7', 'CTRL is changed while BUSY in more than EN: what the transfers under way do is not defined');
     }
+    if (this.busy && !(value & EN) && ((value >> 11) & 0xf) !== this.index && this.chainTo !== ((value >> 11) & 0xf)) {
+      this.#note('2.5.2.2', `CTRL stops it and says CHAIN_TO ${(value >> 11) & 0xf}: what is still in flight may start that channel`);
+    }
     this.#configure(value & SETTINGS);
     if (this.active) this.schedule();
     else this.transferAlarm.cancel(); // paused: BUSY stays

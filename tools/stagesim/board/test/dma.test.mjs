@@ -187,3 +187,16 @@ test('what the datasheet reserves is a violation', () => {
     assert.equal(violations(b), 1, offend.toString());
   }
 });
+
+test('a channel that is stopped while busy must not name another one in CHAIN_TO (2.5.2.2)', () => {
+  for (const [chain, expected] of [[0, 1], [5, 0]]) {
+    const b = new Bench();
+    b.write(DMA + 0x40 * 5, 0x20000800);
+    b.write(DMA + 0x40 * 5 + 4, 0x20000900);
+    b.write(DMA + 0x40 * 5 + 8, 100);
+    b.write(DMA + 0x40 * 5 + 12, (0 << 15) | (5 << 11) | (2 << 2) | 1); // paced by PIO, busy for ever
+    b.run(10);
+    b.write(DMA + 0x40 * 5 + 16, chain << 11);
+    assert.equal(b.violations.list.filter((text) => /CHAIN_TO/.test(text)).length, expected);
+  }
+});
