@@ -41,16 +41,18 @@ export class Bus {
     this.#has = { [FULL_CLOCK]: () => clocks.sysHz === TICK_HZ, [TICK]: () => watchdog.tickHz === 1e6 };
     for (const block of BLOCKS) this.#add(block);
     for (const [name, base] of Object.entries(NOT_MODELLED)) this.#add({ name, base, section: '2.2', registers: {} });
+    // SRAM first and by itself, for every instruction is fetched from there.
     const bytes = chip.sram;
-    const view = chip.sramView;
+    const halfwords = new Uint16Array(bytes.buffer);
+    const words = new Uint32Array(bytes.buffer);
     chip.readUint32 = (address) => {
       const at = (address >>> 0) - SRAM;
-      if (at >= 0 && at < SRAM_BYTES && (at & 3) === 0) return view.getUint32(at, true);
+      if (at >= 0 && at < SRAM_BYTES && (at & 3) === 0) return words[at >> 2];
       return this.#read(address >>> 0, 4);
     };
     chip.readUint16 = (address) => {
       const at = (address >>> 0) - SRAM;
-      if (at >= 0 && at < SRAM_BYTES && (at & 1) === 0) return view.getUint16(at, true);
+      if (at >= 0 && at < SRAM_BYTES && (at & 1) === 0) return halfwords[at >> 1];
       return this.#read(address >>> 0, 2);
     };
     chip.readUint8 = (address) => {
@@ -59,12 +61,12 @@ export class Bus {
     };
     chip.writeUint32 = (address, value) => {
       const at = (address >>> 0) - SRAM;
-      if (at >= 0 && at < SRAM_BYTES && (at & 3) === 0) view.setUint32(at, value, true);
+      if (at >= 0 && at < SRAM_BYTES && (at & 3) === 0) words[at >> 2] = value;
       else this.#write(address >>> 0, value, 4);
     };
     chip.writeUint16 = (address, value) => {
       const at = (address >>> 0) - SRAM;
-      if (at >= 0 && at < SRAM_BYTES && (at & 1) === 0) view.setUint16(at, value, true);
+      if (at >= 0 && at < SRAM_BYTES && (at & 1) === 0) halfwords[at >> 1] = value;
       else this.#write(address >>> 0, value, 2);
     };
     chip.writeUint8 = (address, value) => {

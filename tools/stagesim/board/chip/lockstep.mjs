@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Time itself: processor, PIO, DMA and timers advance together, cycle by cycle, and where nothing can happen time
 // jumps to the next cycle in which something does.
+import { BusFault } from './bus.mjs';
 import { HandlerTimes } from './handler_times.mjs';
-import { runInstruction } from './processor.mjs';
+import { runInstruction, takeBusFault } from './processor.mjs';
 
 const CYCLE_NS = 8;
 
@@ -52,9 +53,21 @@ export class Lockstep {
 
   /** Runs until `end`, or at most one instruction past it, or until stop() is called from within. */
   run(end) {
+    this.#stopped = false;
+    while (this.#time.cycle < end && !this.#stopped) {
+      try {
+        this.#runUntilFault(end);
+      } catch (error) {
+        if (!(error instanceof BusFault)) throw error;
+        takeBusFault(this.#chip.core);
+        this.#advance(this.#time.cycle + 1, false);
+      }
+    }
+  }
+
+  #runUntilFault(end) {
     const { core } = this.#chip;
     const time = this.#time;
-    this.#stopped = false;
     while (time.cycle < end && !this.#stopped) {
       if (this.#rom !== null) {
         this.#runRom(end);

@@ -7,7 +7,6 @@ import { BusFault } from './bus.mjs';
 const EXC_NMI = 2;
 const EXC_HARDFAULT = 3;
 const EXECUTE_NEVER = 0x40000000; // from here on (ARMv6-M B3.1)
-const EXC_RETURN = 0xf0000000;
 const ENTRY_CYCLES = 15; // Cortex-M0+ TRM 3.4.1 with zero wait states; the return takes about as long
 const RETURN_CYCLES = 13;
 
@@ -80,29 +79,24 @@ function wakePending(core) {
     core.pendingPendSV;
 }
 
+/** The instruction under way has met a bus fault. */
+export function takeBusFault(core) {
+  core.PC = core.instructionAt;
+  core.extraCycles = 0;
+  raiseHardFault(core.rp2040);
+}
+
 /**
  * Runs one instruction and returns its cycles. Afterwards `core.waiting` is true if nothing but an interrupt can make
  * the program go on: WFI, or a branch to itself.
  */
 export function runInstruction(core) {
   const from = core.PC;
-  const cycles = execute(core, from) + core.extraCycles;
+  core.instructionAt = from;
+  if (from >= EXECUTE_NEVER) throw new BusFault('an instruction where nothing may run');
+  const cycles = core.executeInstruction() + core.extraCycles;
   core.extraCycles = 0;
   if (core.PC === from) core.waiting = true;
   if (core.waiting && wakePending(core)) core.waiting = false;
   return cycles;
-}
-
-const FAULT_CYCLES = 1;
-
-function execute(core, from) {
-  try {
-    if (from >>> 0 >= EXECUTE_NEVER && from >>> 0 < EXC_RETURN) throw new BusFault('an instruction where nothing may run');
-    return core.executeInstruction();
-  } catch (error) {
-    if (!(error instanceof BusFault)) throw error;
-    core.PC = from;
-    raiseHardFault(core.rp2040);
-    return FAULT_CYCLES;
-  }
 }
