@@ -2,6 +2,7 @@
 # Board time and the world's: at rest without cost, never ahead of a slow reader, bounded by the wall clock if asked.
 import json
 import os
+import signal
 import threading
 import time
 
@@ -70,5 +71,23 @@ def test_in_wall_pace_the_board_is_not_faster_than_the_clock_and_counts_what_nob
     status = link.wait_until([wire.DONE, wire.FAULT])
     wall_s = time.monotonic() - begin
     assert status["fault"] == 0
-    assert wall_s >= 0.98 * 4 * slots * PERIOD_TICKS * 8e-9
+    # The board may catch up with 5 ms of the clock, and no more, however busy this machine is.
+    assert wall_s >= 4 * slots * PERIOD_TICKS * 8e-9 - 0.005
     assert board.stop()["dropped"] > 0  # the stream was never read
+
+
+def test_in_wall_pace_a_board_that_was_stopped_for_a_while_stays_late_and_says_so(emulated):
+    cycles, slots, stopped_s = 2, 540, 0.6
+    board = emulated("--pace", "wall")
+    link = board.plug()
+    link.load(paper_program(cycles, slots))
+    link.arm()
+    begin = time.monotonic()
+    link.ask(wire.START)
+    board.process.send_signal(signal.SIGSTOP)
+    time.sleep(stopped_s)
+    board.process.send_signal(signal.SIGCONT)
+    assert link.wait_until([wire.DONE, wire.FAULT])["fault"] == 0
+    assert time.monotonic() - begin >= cycles * slots * PERIOD_TICKS * 8e-9 + stopped_s - 0.01
+    assert board.stop()["wall_late_us"] >= (stopped_s - 0.01) * 1e6
+    assert "behind the wall clock by" in board.log

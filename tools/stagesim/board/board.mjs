@@ -78,6 +78,8 @@ async function main() {
   });
   await pacer.run();
 
+  const { wall_late_us } = pacer.statistics;
+  if (wall_late_us > 0) log(`behind the wall clock by ${Math.round(wall_late_us / 1000)} ms in all: this machine is too busy`);
   usb?.close();
   can?.close();
   vcd?.close(board.tick);

@@ -22,7 +22,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --exposures SOCKET  connect there and send every exposure as a JSON line
   --vcd FILE          write the board's signals as a value change dump
   --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
-  --pace wall         at most as fast as the wall clock; exposures that nobody takes in time are dropped and counted
+  --pace wall         as fast as the wall clock, or slower where the machine is busy (told at the end); exposures that nobody
+                      takes in time are dropped and counted
   --active-low N      the camera on trigger N exposes while its pin is low; may be given several times
   --chain-bits N      length of the lamps' shift chain (default 176)
   --naive             step every cycle: slow, for checking the fast way

@@ -9,9 +9,12 @@ const CAN_SLICE_TICKS = SLICE_TICKS / 8; // a node of the bus answers within a f
 const SETTLE_TICKS = 8 * TICKS_PER_MS; // quiet for so long, or nothing more happens: a suspend needs 3 ms
 const GRANT_TICKS = 50 * TICKS_PER_MS; // for a request to be answered: the firmware looks every millisecond
 const FOREVER_MS = 0x7fffffff; // the longest timer there is
+const CATCH_UP_NS = 5e6; // in wall pace, what timers and single slices may cost; what comes later than that stays late
 const AWAKE_FRACTION = 0.1; // a processor that only wakes for ticks and frames is idle
 
 /**
+ * Wall pace. Time runs as fast as the clock, or slower: what a busy machine has taken from it is told, and never made up for.
+ *
  * Virtual pace. While the board plays or works, time runs as fast as it can. When all is quiet and transfers wait for
  * the device, time passes no faster than the wall clock, so that a time-out or a timer can come. When nothing waits
  * either, time stands still until a client does something: an idle board costs no processor time, its watchdog cannot
@@ -34,7 +37,7 @@ export class Pacer {
   #startWall_ns = process.hrtime.bigint();
   #startTick;
   #running_ns = 0n;
-  #lag_ns = 0;
+  #late_ns = 0; // in wall pace, in all
 
   #openSince;
 
@@ -75,7 +78,7 @@ export class Pacer {
     const running_s = Number(this.#running_ns) / 1e9;
     const { user, system } = process.cpuUsage();
     return { ticks, running_s, mcycles_per_s: ticks / 1e6 / running_s, mcycles_per_cpu_s: ticks / (user + system),
-             wall_lag_max_us: this.#lag_ns / 1000 };
+             wall_late_us: this.#late_ns / 1000 };
   }
 
   /** Runs until stopped or out of ticks. */
@@ -126,7 +129,11 @@ export class Pacer {
     const wall_ns = Number(process.hrtime.bigint() - this.#startWall_ns);
     if (board_ns > wall_ns) await sleep((board_ns - wall_ns) / 1e6);
     else await new Promise(setImmediate);
-    this.#lag_ns = Math.max(this.#lag_ns, wall_ns - board_ns);
+    // A board that was kept from running is late, and stays so: it never goes faster than the clock to catch up.
+    const late_ns = wall_ns - board_ns - CATCH_UP_NS;
+    if (late_ns <= 0) return;
+    this.#late_ns += late_ns;
+    this.#startWall_ns += BigInt(Math.round(late_ns));
   }
 
   /** Until something has come in, at most `ms`. */
