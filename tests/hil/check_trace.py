@@ -26,18 +26,22 @@ TRIGGERS = ("TRIG0", "TRIG1", "TRIG2", "TRIG3")
 def read_vcd(path, healthy=False):
     """The value changes of a VCD with a time scale of 1 ns, as (tick, signal name, level) in order of time. HEALTHY, which
     beats as the main loop turns and not as a program plays, is left out unless asked for."""
-    names, changes, tick = {}, [], 0
+    meanings, changes, tick = {}, [], 0  # meanings: of each line that says a level, which is most of a trace of millions
     with open(path) as lines:
         for line in lines:
-            if line.startswith("$var"):
-                _, _, _, identifier, name, _ = line.split()
-                names[identifier] = name
+            if line in meanings:
+                if meanings[line]:
+                    changes.append((tick, *meanings[line]))
             elif line[0] == "#":
                 tick, rest = divmod(int(line[1:]), TICK_NS)
                 if rest:
                     raise SystemExit(f"{path}: the time {line.strip()} is not a whole tick")
-            elif line[0] in "01" and names and (healthy or names[line[1:].strip()] != "HEALTHY"):
-                changes.append((tick, names[line[1:].strip()], int(line[0])))
+            elif line.startswith("$var"):
+                _, _, _, identifier, name, _ = line.split()
+                for level in (0, 1):
+                    meanings[f"{level}{identifier}\n"] = (name, level) if healthy or name != "HEALTHY" else None
+            elif line[0] in "01":
+                raise SystemExit(f"{path}: the line {line.strip()} is of no signal that was declared")
     if not changes:
         raise SystemExit(f"{path}: no value changes; is this a VCD of the board?")
     return changes
