@@ -45,8 +45,8 @@ void board_connect_pins(uint8_t inverted_triggers) {
 }
 
 static void init_pins(void) {
-    SIO_GPIO_OUT =
-        0;  // a debugger, or a jump to the reset handler, may leave bits: SIO has no reset of its own in RESETS
+    // A debugger, or a jump to the reset handler, may leave bits: SIO has no reset of its own in RESETS.
+    SIO_GPIO_OUT = 0;
     prepare_dark(BOARD_LIGHT_EN_ACTIVE_LOW << BOARD_PIN_LIGHT_EN);
     board_dark();
     for (uint32_t n = 0; n < OUTPUT_PINS; n++) {

@@ -2,7 +2,7 @@
 // One PIO block: registers, instruction memory, flags and interrupts around four state machines
 // (RP2040 datasheet 3.5 and 3.7). Takes the place of rp2040js' own model, whose time is not the chip's.
 import { BasePeripheral } from 'rp2040js';
-import { PioMachine, rotate } from './pio_machine.mjs';
+import { PioMachine, withPins } from './pio_machine.mjs';
 import { Stall } from './pio_stall.mjs';
 
 const NEVER = Infinity;
@@ -29,7 +29,6 @@ const DEBUG_TXSTALL = 24;
 const DEBUG_TXOVER = 16;
 const DEBUG_RXUNDER = 8;
 const DEBUG_RXSTALL = 0;
-const GPIO_MASK = 0x3fffffff;
 
 export class Pio extends BasePeripheral {
   /**
@@ -115,16 +114,14 @@ export class Pio extends BasePeripheral {
   // What machines do to what they share
 
   writePins(value, base, count) {
-    const mask = rotate(count >= 32 ? 0xffffffff : (1 << count) - 1, base) & GPIO_MASK;
-    const pins = (this.pinValues & ~mask) | (rotate(value, base) & mask);
+    const pins = withPins(this.pinValues, value, base, count);
     if (pins === this.pinValues) return;
     this.pinValues = pins;
     this.pinsChanged = true;
   }
 
   writeDirections(value, base, count) {
-    const mask = rotate(count >= 32 ? 0xffffffff : (1 << count) - 1, base) & GPIO_MASK;
-    const directions = (this.pinDirections & ~mask) | (rotate(value, base) & mask);
+    const directions = withPins(this.pinDirections, value, base, count);
     if (directions === this.pinDirections) return;
     this.pinDirections = directions;
     this.pinsChanged = true;

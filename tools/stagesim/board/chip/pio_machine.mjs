@@ -17,6 +17,7 @@ const EXEC_STATUS_RX = 1 << 4;
 const EXEC_NOT_MODELLED = 0x3 << 17; // INLINE_OUT_EN, OUT_STICKY
 const SHIFT_JOIN_RX = 1 << 31;
 const SHIFT_JOIN_TX = 1 << 30;
+const GPIO_MASK = 0x3fffffff; // GPIO 0 to 29 have a pad
 
 export class PioMachine {
   /** @param {import('./pio.mjs').Pio} block */
@@ -358,7 +359,13 @@ function pinMask(base, count) {
   return count <= 0 ? 0 : rotate(count >= 32 ? 0xffffffff : (1 << count) - 1, base);
 }
 
+/** `pins` with `count` of them from `base` on taken from `value`. */
+export function withPins(pins, value, base, count) {
+  const mask = pinMask(base, count) & GPIO_MASK;
+  return (pins & ~mask) | (rotate(value, base) & mask);
+}
+
 /** A 32-bit word rotated left: pin mappings wrap from GPIO 31 to 0. */
-export function rotate(value, places) {
+function rotate(value, places) {
   return places === 0 ? value : (value << places) | (value >>> (32 - places));
 }
