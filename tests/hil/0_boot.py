@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # From reset to the first answer: boot ROM, boot2, the copy to SRAM, clocks, USB; and what never gets so far stays dark. Prints
-# the times of docs/hardware.md (pytest -s).
+# the times of docs/firmware.md, "Start" (pytest -s).
 import os
 import signal
 import subprocess
