@@ -230,6 +230,7 @@ enum {
 // System information: 1 in the top four bits for B0 and B1, 2 for B2 (2.20)
 #define SYSINFO_CHIP_ID REGISTER(0x40000000)
 #define SYSINFO_CHIP_REVISION (SYSINFO_CHIP_ID >> 28)
+#define REVISION_B2 2
 
 // USB device controller (4.1.4) and its memory (4.1.2.5)
 #define USB_MEMORY 0x50100000

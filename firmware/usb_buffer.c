@@ -5,7 +5,7 @@
 #include "board.h"
 #include "rp2040.h"
 
-enum { MEMORY_BYTES = 4096, REVISION_B2 = 2 };
+enum { MEMORY_BYTES = 4096 };
 enum {
     TRANSACTION_US = 100
 };  // the longest there is, a packet of 64 bytes with its tokens, takes 52 us (USB 2.0 5.8.4)

@@ -8,7 +8,7 @@
 #include "board.h"
 #include "rp2040.h"
 
-enum { PIN_DP = 15, REVISION_B2 = 2, GIVE_UP_US = 2000 };
+enum { PIN_DP = 15, GIVE_UP_US = 2000 };
 
 static enum { NOTHING_TO_DO, WAITING_FOR_END, BORROWING } state;
 static bool in_doubt;

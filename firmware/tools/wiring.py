@@ -15,7 +15,7 @@ from pathlib import Path
 IOVDD, VIH, VIL, VOH_MIN, VOL_MAX = 3.3, 2.0, 0.8, 2.62, 0.5
 PULL_DOWN_OHM = (50e3, 80e3)
 LINE_OHM = 100  # a twisted pair, or a ribbon with a ground beside each signal
-NS_PER_M, PF_PER_M, TICK_NS = 5, 100, 8
+NS_PER_M, PF_PER_M = 5, 100
 RESISTOR, CAPACITOR, X7R = 0.01, 0.05, 0.10  # tolerances
 
 

@@ -2,7 +2,6 @@
 # USB as the silicon has it: suspension at each plug-in, bus errors and lock-ups (erratum RP2040-E15), a B1 chip behind a busy
 # hub (E5), data toggles that restart, control transfers given up. The emulated controller notes what a chip would not forgive.
 import random
-import re
 
 import check_trace
 import pytest
@@ -11,6 +10,7 @@ from ols_board import board as board_of
 from ols_board import wire
 from ols_board.board import BoardError
 from ols_board.program import PERIOD_TICKS, paper_program
+from ols_board.stops import injected
 from ols_board.usb import BULK, BULK_IN, CONTROL, DISCONNECTED, OK, STALL, TIMED_OUT
 
 MS = 125_000  # ticks
@@ -49,10 +49,6 @@ def ask_until_answered(link, tries=20_000):
         except ConnectionError:
             pass
     raise TimeoutError("the board answers nothing any more")
-
-
-def injected_tick(board, name):
-    return int(re.search(rf"injected at tick (\d+): {name}\n", board.log)[1])
 
 
 def test_a_board_that_suspended_before_its_host_came_plays_on(emulated):
@@ -105,7 +101,8 @@ def test_a_lock_up_in_play_is_dark_as_host_lost_in_its_time_and_the_board_comes_
     plays_on(link, 50)
     board.stop()
     rises = [tick for tick, name, level in check_trace.read_vcd(board.trace) if name == "TRIG0" and level]
-    silent_ms = (status["fault_ticks"] - (injected_tick(board, "fatalbuserror") - rises[0])) / MS
+    (at, _), = injected(board, {"fatalbuserror"})
+    silent_ms = (status["fault_ticks"] - (at - rises[0])) / MS
     assert LOCKED_UP_MS <= silent_ms < LOCKED_UP_MS + 10
 
 
