@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "archive/archive.hpp"
+#include "image/target.hpp"
 #include "capture/aligned_rows.hpp"
 #include "reflectance/row_filler.hpp"
 #include "stage/calibration.hpp"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "archive/archive.hpp"
+#include "image/target.hpp"
 #include "image/frame.hpp"
 #include "image/plane.hpp"
 #include "stage/calibration.hpp"
