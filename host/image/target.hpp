@@ -37,7 +37,7 @@ struct Target {
     // solved. Empty if no sample of the target was filled in.
     std::vector<float> noise_gain;
     // [y * width + x]: how well the flow that aligned this pixel's samples leads back to where it came from, 0 to 1, the
-    // least of all (reflectance/flow.hpp, confidence()). Empty if nothing was aligned.
+    // least of all (flow/flow.hpp, confidence()). Empty if nothing was aligned.
     std::vector<float> confidence;
     TargetMatte matte;  // of a performance whose sequence has matte slots; of a head that was read, all but its samples
     std::vector<int> missing_lamps;  // lamps that were not seen (a lost slot of the single basis); their planes are 0

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "capture/card.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
+#include "take/card.hpp"
 
 namespace ols {
 

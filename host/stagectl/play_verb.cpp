@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "capture/board_log.hpp"
-#include "capture/recorder.hpp"
+#include "record/board_log.hpp"
+#include "record/recorder.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"

@@ -4,11 +4,11 @@
 
 #include <fstream>
 
-#include "capture/basis_record.hpp"
-#include "capture/take.hpp"
+#include "develop/basis_record.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
+#include "take/take.hpp"
 
 namespace ols {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Kinds of lighting basis: the noise that a recovered lamp has on a grey card and in deep shadow, and the time that the
 // inversion of a target takes.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
 
 #include "bench.hpp"
-#include "reflectance/demultiplex.hpp"
+#include "demultiplex/demultiplex.hpp"
 #include "stage/sequence.hpp"
 
 using namespace ols;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Motion blur: sub-frames of a moved sheet, beside the two usual ways of blurring along flow.
-// links: ols_reflectance opencv_imgproc
+// links: ols_relight opencv_imgproc
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "../unit/blur_scene.hpp"
 #include "bench.hpp"
 #include "image/compare.hpp"
-#include "reflectance/exposure_path.hpp"
-#include "reflectance/motion_blur.hpp"
+#include "relight/exposure_path.hpp"
+#include "relight/motion_blur.hpp"
 
 using namespace ols;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Optical flow: methods side by side on clean scenes and through the camera's noise, and what Brox's settings cost.
-// links: ols_reflectance
+// links: ols_flow
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "../unit/flow_scenes.hpp"
 #include "bench.hpp"
-#include "reflectance/flow.hpp"
+#include "flow/flow.hpp"
 
 using namespace ols;
 using namespace ols::scenes;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The inversion of a basis to single lamps: arithmetic and method, what it writes, how images are stored, SIMD path.
-// links: ols_reflectance PkgConfig::OPENBLAS Eigen3::Eigen
+// links: ols_demultiplex PkgConfig::OPENBLAS Eigen3::Eigen
 #include <cblas.h>
 
 #include <half.h>
@@ -10,9 +10,9 @@
 #include <memory>
 
 #include "bench.hpp"
+#include "demultiplex/demultiplex.hpp"
+#include "demultiplex/hadamard_tile.hpp"
 #include "four_russians.hpp"
-#include "reflectance/demultiplex.hpp"
-#include "reflectance/hadamard_tile.hpp"
 
 using namespace ols;
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Masked samples: what lost slots and saturated highlights cost the inversion.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "bench.hpp"
-#include "reflectance/demultiplex.hpp"
-#include "reflectance/row_filler.hpp"
+#include "demultiplex/demultiplex.hpp"
+#include "demultiplex/row_filler.hpp"
 
 using namespace ols;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Relighting: the weights that lamps get from an environment, and the weighted sum of OLAT images.
-// links: ols_reflectance PkgConfig::OPENBLAS
+// links: ols_relight PkgConfig::OPENBLAS
 #include <cblas.h>
 
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <random>
 
 #include "bench.hpp"
-#include "reflectance/relight.hpp"
+#include "relight/relight.hpp"
 
 using namespace ols;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Variance of a target: square roots in float and sums that rows share, beside the definition in double precision.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "bench.hpp"
-#include "reflectance/variance.hpp"
+#include "demultiplex/variance.hpp"
 
 using namespace ols;
 

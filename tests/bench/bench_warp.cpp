@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Warping a cycle's slots to one target: beside OpenCV, by how straight motion must be, and from flow of lower resolution.
-// links: ols_reflectance
+// links: ols_develop
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "bench.hpp"
-#include "reflectance/masked_sample.hpp"
-#include "reflectance/warp.hpp"
+#include "demultiplex/masked_sample.hpp"
+#include "develop/warp.hpp"
 
 using namespace ols;
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "capture/frame_store.hpp"
+#include "develop/frame_store.hpp"
 #include "image/whole_file.hpp"
 #include "inputs.hpp"
 #include "slot_frames.hpp"

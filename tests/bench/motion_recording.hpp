@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/motion_developer.hpp"
+#include "develop/motion_developer.hpp"
 #include "effects/effect.hpp"
 #include "stage/calibration.hpp"
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Edges of what moves: drawing lines along the flow, the usual way, mixes both sides of an edge and leaves the subject
 // where it was uncovered; gathering along a pixel's own flow does not blur over what stands still.
-// links: ols_reflectance
+// links: ols_relight
 #include <algorithm>
 #include <cmath>
 
 #include "hard_case.hpp"
-#include "reflectance/motion_blur.hpp"
+#include "relight/motion_blur.hpp"
 
 using namespace ols;
 

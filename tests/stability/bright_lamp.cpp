@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // One lamp a thousand times brighter than the rest stands in half of all rows: the others are small differences of large
 // sums.
-// links: ols_reflectance Eigen3::Eigen
+// links: ols_demultiplex Eigen3::Eigen
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cstdlib>
 
+#include "demultiplex/demultiplex.hpp"
 #include "hard_case.hpp"
-#include "reflectance/demultiplex.hpp"
 
 using namespace ols;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Even surroundings of a moving subject: flow there is anything, which harms nobody; but a subject that covers what is as
 // bright as itself must not pass for it.
-// links: ols_capture
-#include "capture/tracking_image.hpp"
+// links: ols_develop
+#include "develop/tracking_image.hpp"
 #include "hard_case.hpp"
 #include "moving_take.hpp"
 

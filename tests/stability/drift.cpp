@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Errors of flow add up over a long concatenation.
-// links: ols_reflectance
+// links: ols_develop
 #include <random>
 
 #include "../unit/flow_scenes.hpp"
+#include "develop/tracking_flows.hpp"
 #include "hard_case.hpp"
-#include "reflectance/tracking_flows.hpp"
 
 using namespace ols;
 using namespace ols::scenes;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Subjects that show nothing above the camera's noise, black or textureless: flow that reads the noise carries them about.
-// links: ols_capture
-#include "capture/tracking_image.hpp"
+// links: ols_develop
+#include "develop/tracking_image.hpp"
 #include "hard_case.hpp"
 #include "moving_take.hpp"
 

@@ -2,16 +2,16 @@
 // A matte ball with a wet spot whose highlights saturate: naive inversion of clipped counts against masked samples, as figures and as a picture
 // (out/stability/glossy_ball.png: true, naive, unsolved left 0, smooth, non-negative; above one lamp of the highlights,
 // below one from the side, in which the naive inversion shows the highlights of other lamps).
-// links: ols_reflectance ols_image
+// links: ols_demultiplex
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
+#include "demultiplex/demultiplex.hpp"
+#include "demultiplex/row_filler.hpp"
 #include "hard_case.hpp"
-#include "reflectance/demultiplex.hpp"
-#include "reflectance/row_filler.hpp"
 
 using namespace ols;
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Sums of 156 samples leave int16 at 420 counts a lamp and wrap in silence; the inversion notices and is exact.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <vector>
 
+#include "demultiplex/demultiplex.hpp"
 #include "hard_case.hpp"
-#include "reflectance/demultiplex.hpp"
 
 using namespace ols;
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Lost slots of a multiplexed basis, to the last that can be solved and beyond.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "demultiplex/row_fill.hpp"
 #include "hard_case.hpp"
-#include "reflectance/row_fill.hpp"
 
 using namespace ols;
 

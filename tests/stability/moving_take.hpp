@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/frame_store.hpp"
+#include "develop/frame_store.hpp"
 
 namespace ols::moving {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Takes on which flow fails, in part or altogether: what compensation makes of them is never worse than none by more than a
 // wrong vector can move.
-// links: ols_capture
+// links: ols_develop
 #include "hard_case.hpp"
 #include "moving_take.hpp"
 

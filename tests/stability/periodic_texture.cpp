@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A periodic texture over several tracking frames: the far ones look the same shifted by whole periods.
-// links: ols_capture
-#include "capture/tracking_image.hpp"
+// links: ols_develop
+#include "develop/tracking_image.hpp"
 #include "hard_case.hpp"
 #include "moving_take.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Motion that reverses inside a cycle, and tracking frames lost while it does: a single pace is wrong on either side, and the
 // subject is between frames where a straight line does not lead.
-// links: ols_capture
-#include "capture/tracking_image.hpp"
+// links: ols_develop
+#include "develop/tracking_image.hpp"
 #include "hard_case.hpp"
 #include "moving_take.hpp"
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // A highlight that saturates some rows of a multiplexed basis: clipped counts move every lamp of the pixel.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
+#include "demultiplex/row_filler.hpp"
 #include "hard_case.hpp"
-#include "reflectance/row_filler.hpp"
 
 using namespace ols;
 
@@ -80,7 +80,7 @@ TEST(SaturatedHighlight, in_one_row_is_solved_exactly) {
 }
 
 // Bound: the truth agrees with the unsaturated rows, has no negative lamp and none of its saturated rows below white: both it
-// and the estimate lie in the ball of optimal recovery (reflectance/estimate_bound.hpp) of radius B = |truth|_K around
+// and the estimate lie in the ball of optimal recovery (demultiplex/estimate_bound.hpp) of radius B = |truth|_K around
 // the smooth estimate, so that they are at most power (B + |estimate|_K) apart, and the estimate's norm is at most 2 B.
 TEST(SaturatedHighlight, of_several_lamps_is_estimated_within_its_bound) {
     const Pixel pixel(1400, 20);

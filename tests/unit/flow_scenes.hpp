@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "flow/flow_field.hpp"
 #include "image/frame.hpp"
-#include "reflectance/flow_field.hpp"
 
 namespace ols::scenes {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Samples at another time's places: against ramps, whose bilinear interpolation is exact, and against the input's own bits.
-// links: ols_capture
-#include "capture/align.hpp"
+// links: ols_develop
+#include "develop/align.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <random>
 #include <type_traits>
 
-#include "capture/aligned_rows.hpp"
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
+#include "develop/aligned_rows.hpp"
 
 using namespace ols;
 

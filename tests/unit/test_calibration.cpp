@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Calibration folders, and the block means that the optical code looks at.
-// links: ols_capture
+// links: ols_record
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -10,8 +10,8 @@
 #include <fstream>
 #include <limits>
 
-#include "capture/frame_summary.hpp"
 #include "image/exr.hpp"
+#include "record/frame_summary.hpp"
 #include "stage/calibration.hpp"
 
 using namespace ols;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Saturated samples that count as they were read: lamps against the inversion of clipped rows written out with Eigen, how far
 // they are off, and what no clipped count mends.
-// links: ols_capture
+// links: ols_develop
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "capture/develop.hpp"
+#include "develop/develop.hpp"
 
 using namespace ols;
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Demultiplexing: lamps that were multiplexed by hand come back exactly, from any thread count; noise comes out with the
 // variance that the basis promises.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numeric>
 #include <random>
 
-#include "reflectance/demultiplex.hpp"
-#include "reflectance/planes.hpp"
-#include "reflectance/variance.hpp"
+#include "demultiplex/demultiplex.hpp"
+#include "demultiplex/planes.hpp"
+#include "demultiplex/variance.hpp"
 
 using namespace ols;
 

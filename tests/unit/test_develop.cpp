@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Developing a cycle against the inversion written out in double precision, and what masks and missing slots become.
-// links: ols_capture
+// links: ols_develop
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 #include <random>
 
-#include "capture/align.hpp"
-#include "capture/develop.hpp"
+#include "develop/align.hpp"
+#include "develop/develop.hpp"
 
 using namespace ols;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Lost slots and saturated samples through the development of a cycle: the error of simulated takes against generalised
 // least squares on what is left, written out with Eigen, and what the target says of it.
-// links: ols_capture
+// links: ols_develop
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -10,7 +10,7 @@
 #include <map>
 #include <random>
 
-#include "capture/develop.hpp"
+#include "develop/develop.hpp"
 
 using namespace ols;
 

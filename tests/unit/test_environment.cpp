@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Reading environment maps, and the solid angles of their texels.
-// links: ols_reflectance
+// links: ols_relight
 #include <ImfChannelList.h>
 #include <ImfEnvmap.h>
 #include <ImfFrameBuffer.h>
@@ -17,7 +17,7 @@
 #include <random>
 
 #include "image/exr.hpp"
-#include "reflectance/environment.hpp"
+#include "relight/environment.hpp"
 
 namespace ols {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What shows above noise and how far it is, in images whose edges and noise are known.
-// links: ols_reflectance
-#include "reflectance/evenness.hpp"
+// links: ols_flow
+#include "flow/evenness.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <limits>
 #include <random>
 
-#include "reflectance/flow.hpp"
+#include "flow/flow.hpp"
 
 using namespace ols;
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Every flow method against motions known in closed form; what keeps and what breaks it.
-// links: ols_reflectance
+// links: ols_flow
 #include <gtest/gtest.h>
 
 #include <hwy/highway.h>
 #include <opencv2/core.hpp>
 
+#include "flow/flow.hpp"
 #include "flow_scenes.hpp"
-#include "reflectance/flow.hpp"
 
 using namespace ols;
 using namespace ols::scenes;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Flow from images that say little, or wrong things: always finite, and what is not known comes from the surroundings.
-// links: ols_reflectance
+// links: ols_flow
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "flow/flow.hpp"
 #include "flow_scenes.hpp"
-#include "reflectance/flow.hpp"
 
 using namespace ols;
 using namespace ols::scenes;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // The flows' linear solver against a dense factorisation, and its single pass against whole sweeps done plainly.
-// links: ols_reflectance Eigen3::Eigen
+// links: ols_flow Eigen3::Eigen
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <random>
 
-#include "reflectance/flow_relaxation_inl.hpp"
+#include "flow/flow_relaxation_inl.hpp"
 
 using namespace ols;
 

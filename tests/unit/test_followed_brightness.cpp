@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Samples that follow the brightness of the tracking frames: the factor's closed form, and what must not move.
-// links: ols_capture
+// links: ols_develop
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
 #include <cmath>
 #include <random>
 
-#include "capture/followed_brightness.hpp"
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
+#include "develop/followed_brightness.hpp"
 
 using namespace ols;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The structured inversion of Hadamard bases: exact in integers on every SIMD path, for any counts, with short sums that
 // wrapped always noticed; and as few additions as it says.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <gtest/gtest.h>
 
 #include <half.h>
@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <random>
 
-#include "reflectance/hadamard_tile.hpp"
+#include "demultiplex/hadamard_tile.hpp"
 
 using namespace ols;
 

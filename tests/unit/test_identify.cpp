@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Identification against every fault, in every kind of slot. The truth, which trigger a frame's light came from, is kept
 // beside the frames where the code under test cannot see it: whatever goes wrong, no frame may be mislabelled.
-// links: ols_capture
+// links: ols_record
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "capture/identify.hpp"
+#include "record/identify.hpp"
 
 using namespace ols;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Environment integration against closed forms, hand-made tables of directions, and conservation of energy.
-// links: ols_reflectance
+// links: ols_relight
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-#include "reflectance/lamp_weights.hpp"
+#include "relight/lamp_weights.hpp"
 
 namespace ols {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which frames a target is made of, against a search through all frames of the take.
-// links: ols_capture
-#include "capture/lazy_basis.hpp"
+// links: ols_develop
+#include "develop/lazy_basis.hpp"
 
 #include <gtest/gtest.h>
 

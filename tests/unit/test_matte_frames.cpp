@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Which matte frames a target takes, and their mean at its time: against ramps that move evenly, in closed form, and layers whose
 // matte is known.
-// links: ols_capture
-#include "capture/matte_frames.hpp"
+// links: ols_develop
+#include "develop/matte_frames.hpp"
 
 #include <gtest/gtest.h>
 

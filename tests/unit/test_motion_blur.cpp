@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Motion blur against closed forms and against brute force; what it keeps, what breaks it, what it refuses.
-// links: ols_reflectance
-#include "reflectance/motion_blur.hpp"
+// links: ols_relight
+#include "relight/motion_blur.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Whole targets of takes whose motion is known: what must not change a bit, and what must stay bounded.
-// links: ols_capture
-#include "capture/motion_developer.hpp"
+// links: ols_develop
+#include "develop/motion_developer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 
 #include "align_limit.hpp"
 #include "align_score.hpp"
-#include "capture/tracking_image.hpp"
+#include "develop/tracking_image.hpp"
 
 using namespace ols;
 

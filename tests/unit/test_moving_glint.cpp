@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A glint that saturates half of a multiplexed basis while it moves: what is left of it with and without its clipped samples.
-// links: ols_capture
+// links: ols_develop
 #include <gtest/gtest.h>
 
 #include <numeric>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Relighting against sums in double precision, and a white sphere in a white furnace.
-// links: ols_reflectance
+// links: ols_relight
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "image/demosaic.hpp"
-#include "reflectance/relight.hpp"
+#include "relight/relight.hpp"
 
 namespace ols {
 namespace {

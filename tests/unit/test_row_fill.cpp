@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Filled rows against least squares on the rows that are left, written out with Eigen's decompositions, and estimates
 // against their bounds.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
 
-#include "reflectance/row_fill.hpp"
+#include "demultiplex/row_fill.hpp"
 #include "stage/stage.hpp"
 
 using namespace ols;

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Tiles with masked samples: grouped sums against sums written out, on every SIMD path; bounds that estimates respect.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
 
-#include "reflectance/bounded_fill.hpp"
-#include "reflectance/demultiplex.hpp"
-#include "reflectance/hadamard_tile.hpp"
-#include "reflectance/row_filler.hpp"
+#include "demultiplex/bounded_fill.hpp"
+#include "demultiplex/demultiplex.hpp"
+#include "demultiplex/hadamard_tile.hpp"
+#include "demultiplex/row_filler.hpp"
 
 using namespace ols;
 

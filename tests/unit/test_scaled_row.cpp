@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Rows that are images of their own: the product in closed form, wherever they begin and however long they are.
-// links: ols_reflectance
-#include "reflectance/scaled_row.hpp"
+// links: ols_demultiplex
+#include "demultiplex/scaled_row.hpp"
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Samples above black, masks and margins, each by definition.
-// links: ols_capture
-#include "capture/signal_planes.hpp"
+// links: ols_develop
+#include "develop/signal_planes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
 
 using namespace ols;
 

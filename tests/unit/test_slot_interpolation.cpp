@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Slots between their frames before and after the target: the blend's closed form, its noise, and what must not change.
-// links: ols_capture
-#include "capture/slot_interpolation.hpp"
+// links: ols_develop
+#include "develop/slot_interpolation.hpp"
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
@@ -9,7 +9,7 @@
 #include <cmath>
 #include <random>
 
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
 
 using namespace ols;
 

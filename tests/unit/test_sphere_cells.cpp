@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Voronoi cells of lamps against symmetry, closed forms and brute force.
-// links: ols_reflectance
+// links: ols_relight
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <numeric>
 #include <random>
 
-#include "reflectance/sphere_cells.hpp"
+#include "relight/sphere_cells.hpp"
 
 namespace ols {
 namespace {

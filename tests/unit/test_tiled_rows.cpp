@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Frames stored in tiles invert to the same as plain images, whatever their size and depth.
-// links: ols_reflectance
+// links: ols_demultiplex
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "reflectance/hadamard_tile.hpp"
-#include "reflectance/tiled_rows.hpp"
+#include "demultiplex/hadamard_tile.hpp"
+#include "demultiplex/tiled_rows.hpp"
 
 using namespace ols;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Paths through tracking frames, against motion in closed form.
-// links: ols_reflectance
-#include "reflectance/tracking_flows.hpp"
+// links: ols_develop
+#include "develop/tracking_flows.hpp"
 
 #include <gtest/gtest.h>
 

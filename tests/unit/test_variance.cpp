@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The variance estimate against its definition in double precision, for rows of both widths, masked and lost ones included.
-// links: ols_reflectance
-#include "reflectance/variance.hpp"
+// links: ols_demultiplex
+#include "demultiplex/variance.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
 
 using namespace ols;
 

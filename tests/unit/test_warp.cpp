@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The warp of integer counts against bilinear interpolation in double precision, on every SIMD path.
-// links: ols_reflectance
-#include "reflectance/warp.hpp"
+// links: ols_develop
+#include "develop/warp.hpp"
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
@@ -12,7 +12,7 @@
 #include <functional>
 #include <random>
 
-#include "reflectance/masked_sample.hpp"
+#include "demultiplex/masked_sample.hpp"
 #include "stage/lamps.hpp"
 
 using namespace ols;

@@ -17,19 +17,26 @@ ROOT = Path(__file__).resolve().parents[2]
 LONGEST_FILE = 500
 SOURCE = (".c", ".h", ".cpp", ".hpp", ".py", ".mjs", ".js", ".sh", ".pio", ".S")
 
-# Which folders of host/ a folder may include; a stage includes only what is upstream of it (docs/architecture.md).
+# Which rooms of host/ a room may include: what is upstream of it, and nothing beside or below (docs/architecture.md).
 UPSTREAM = {
     "image": set(),
     "stage": {"image"},
-    "device": {"image", "stage"},
-    "reflectance": {"image", "stage"},
     "archive": {"image", "stage"},
-    "capture": {"image", "stage", "device", "reflectance", "archive"},
-    "stagectl": {"image", "stage", "device", "reflectance", "archive", "capture"},
+    "device": {"image", "stage"},
+    "record": {"image", "stage", "device"},
+    "flow": {"image"},
+    "demultiplex": {"stage"},
+    "develop": {"image", "stage", "flow", "demultiplex"},
+    "take": {"image", "stage", "device", "record", "develop", "archive"},
+    "relight": {"image", "stage"},
+    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take"},
 }
-TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "reflectance", "archive"}, "stagesim": {"image", "stage", "reflectance"}}
+# Which rooms of host/ a program of tools/ may include.
+TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "archive", "relight"}, "stagesim": {"image", "stage", "flow", "relight"}}
 # The virtual stage feeds the ring that the daemon reads; that one header of device/ is its output.
 EXTRA = {("stagesim", "device/ring.hpp")}
+# The same for the rooms of the virtual stage; its verbs, beside them, see all.
+STAGESIM_UPSTREAM = {"scene": set(), "render": {"scene"}, "run": {"scene", "render"}}
 UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX|HACK)\b")
 
 
@@ -52,19 +59,25 @@ def check_text(path, problems):
 
 
 def check_includes(path, problems):
-    parts = path.relative_to(ROOT).parts
-    if parts[0] == "host" and len(parts) == 3:
-        allowed, here = UPSTREAM[parts[1]] | {parts[1]}, parts[1]
+    name = path.relative_to(ROOT)
+    parts = name.parts
+    if parts[0] == "host" and len(parts) >= 3:
+        if parts[1] not in UPSTREAM:
+            problems.append(f"{name}: host/{parts[1]} is no room that tools/lint/lint.py knows")
+            return
+        here, allowed, rooms = parts[1], UPSTREAM[parts[1]] | {parts[1]}, UPSTREAM
     elif parts[0] == "tools" and len(parts) >= 3 and parts[1] in TOOLS_MAY_INCLUDE:
-        allowed, here = TOOLS_MAY_INCLUDE[parts[1]], parts[1]
+        here, allowed, rooms = parts[1], TOOLS_MAY_INCLUDE[parts[1]], dict(UPSTREAM)
+        if here == "stagesim" and parts[2] in STAGESIM_UPSTREAM:
+            allowed = allowed | STAGESIM_UPSTREAM[parts[2]] | {parts[2]}
+            rooms |= STAGESIM_UPSTREAM
     else:
         return
     for number, line in enumerate(path.read_text(encoding="utf-8").split("\n"), 1):
-        match = re.match(r'\s*#include\s+"([a-z]+)/([a-z0-9_]+\.hpp)"', line)
-        if not match or match[1] not in UPSTREAM:
-            continue
-        if match[1] not in allowed and (here, f"{match[1]}/{match[2]}") not in EXTRA:
-            problems.append(f"{path.relative_to(ROOT)}:{number}: {here} includes {match[1]}, which is not upstream of it")
+        match = re.match(r'\s*#include\s+"([a-z]+)/([a-z0-9_/]+\.hpp)"', line)
+        if match and match[1] in rooms and match[1] not in allowed and (here, f"{match[1]}/{match[2]}") not in EXTRA:
+            where = "/".join(parts[1:-1]) if parts[0] == "tools" else here
+            problems.append(f"{name}:{number}: {where} includes {match[1]}, which is not upstream of it")
 
 
 def check_format(paths, problems):

@@ -11,7 +11,7 @@
 
 #include "archive/archive.hpp"
 #include "lighting.hpp"
-#include "reflectance/relight.hpp"
+#include "relight/relight.hpp"
 #include "verbs.hpp"
 
 namespace ols {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "reflectance/lamp_weights.hpp"
+#include "relight/lamp_weights.hpp"
 #include "result.hpp"
 
 namespace ols {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // rf relight: the subject of an archive under an environment map and point lights.
-#include "reflectance/relight.hpp"
+#include "relight/relight.hpp"
 
 #include <fmt/format.h>
 

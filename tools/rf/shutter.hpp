@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "archive/archive.hpp"
-#include "reflectance/motion_blur.hpp"
+#include "relight/motion_blur.hpp"
 
 namespace ols {
 

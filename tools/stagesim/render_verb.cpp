@@ -12,7 +12,7 @@
 #include "image/png.hpp"
 #include "image/tone.hpp"
 #include "inputs.hpp"
-#include "reflectance/lamp_weights.hpp"
+#include "relight/lamp_weights.hpp"
 #include "renderer.hpp"
 #include "verbs.hpp"
 

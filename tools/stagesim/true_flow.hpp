@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "reflectance/flow_field.hpp"
+#include "flow/flow_field.hpp"
 #include "scene.hpp"
 #include "stage/stage.hpp"
 

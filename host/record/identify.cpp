@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// The trigger log against the placed frames, and the account of every trigger.
+#include "record/identify.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace ols {
+
+Identifier::Identifier(const Sequence& sequence, const IdentifyOptions& options)
+    : trigger_count_(sequence.trigger_count()),
+      cycle_slots_(sequence.slots.size()),
+      period_ticks_(sequence.slots.front().period_ticks),
+      placer_(sequence, options) {}
+
+void Identifier::add_frame(FrameWitness frame) {
+    placer_.add(std::move(frame));
+    settle();
+}
+
+void Identifier::add_log(const std::vector<ols_trigger_log_entry>& entries, uint64_t next_counter, uint64_t arrivals) {
+    for (const auto& entry : entries) {
+        if (!first_entry_) first_entry_ = entry;
+        if (entry.counter >= decided_) log_[entry.counter] = entry;
+        log_end_ = std::max<uint64_t>(log_end_, uint64_t(entry.counter) + 1);
+    }
+    placer_.bound(arrivals, next_counter);
+    settle();
+}
+
+void Identifier::end_log(const std::string& why) {
+    log_ended_ = why;
+    settle();
+}
+
+void Identifier::end_frames() {
+    placer_.end();
+    frames_ended_ = true;
+    settle();
+}
+
+std::vector<Verdict> Identifier::take_verdicts() {
+    return std::exchange(verdicts_, {});
+}
+
+void Identifier::settle() {
+    take_placements();
+    match_log();
+    decide();
+}
+
+MissingSlot& Identifier::note(uint64_t counter) {
+    MissingSlot& slot = notes_[counter];
+    slot.counter = counter;
+    return slot;
+}
+
+void Identifier::take_placements() {
+    for (Placement& placement : placer_.take_placements()) {
+        if (placement.accepted) {
+            accepted_.push_back({*placement.arrival, *placement.counter});
+            continue;
+        }
+        if (placement.counter && *placement.counter >= decided_) {
+            MissingSlot& slot = note(*placement.counter);
+            slot.why = placement.why;
+            slot.camera = placement.arrival.has_value();
+            slot.optical = placement.optical;
+        }
+        if (placement.arrival)
+            verdicts_.push_back({Verdict::discarded, *placement.arrival, {}, {}, std::move(placement.why)});
+    }
+}
+
+// An entry is a witness only if the board did at that tick what the program says: one program, played from its start.
+bool Identifier::fits_program(const ols_trigger_log_entry& entry) const {
+    // As much as any board lets pass: 3 for the measurement, and the echo of a trigger cable of 10 m, 100 ns or 13 ticks.
+    constexpr int64_t tolerance_ticks = 3 + 13;
+    const int64_t expected =
+        int64_t(first_entry_->rise_ticks) + (int64_t(entry.counter) - int64_t(first_entry_->counter)) * period_ticks_;
+    return entry.slot == entry.counter % cycle_slots_ && entry.cycle == entry.counter / cycle_slots_ &&
+           std::abs(int64_t(entry.rise_ticks) - expected) <= tolerance_ticks;
+}
+
+void Identifier::match_log() {
+    for (; !accepted_.empty(); accepted_.pop_front()) {
+        const Accepted frame = accepted_.front();
+        const auto entry = log_.find(frame.counter);
+        if (entry != log_.end() && fits_program(entry->second)) {
+            identified_[frame.counter] = true;
+            verdicts_.push_back({Verdict::identified, frame.arrival, entry->second, {}, ""});
+            continue;
+        }
+        if (entry == log_.end() && frame.counter >= log_end_ && !log_ended_) return;
+        MissingSlot& slot = note(frame.counter);
+        slot.camera = true;
+        slot.why = entry != log_.end()        ? "the trigger log has another slot or time than the program"
+                   : frame.counter < log_end_ ? "the board's trigger log lost it"
+                   : log_ended_->empty()      ? "the board did not fire it"
+                                              : *log_ended_;
+        verdicts_.push_back({Verdict::discarded, frame.arrival, {}, {}, slot.why});
+    }
+}
+
+void Identifier::decide() {
+    uint64_t open = std::min(placer_.lowest_open(), log_end_);
+    if (!accepted_.empty()) open = std::min(open, accepted_.front().counter);
+    if (frames_ended_ && log_ended_) open = trigger_count_;
+    for (; decided_ < open; ++decided_) {
+        if (identified_.erase(decided_) == 0) {
+            MissingSlot& slot = note(decided_);
+            slot.board = log_.contains(decided_);
+            if (slot.why.empty()) {
+                const bool fired = slot.board || !log_ended_ || log_ended_->empty();
+                slot.why = fired ? "no frame came" : *log_ended_;
+            }
+            verdicts_.push_back({Verdict::missing, 0, {}, slot, ""});
+        }
+        notes_.erase(decided_);
+        log_.erase(decided_);
+    }
+}
+
+}  // namespace ols

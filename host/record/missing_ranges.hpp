@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Missing slots for the manifest: neighbours that are missing for one reason share an entry.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "record/identify.hpp"
+
+namespace ols {
+
+class MissingRanges {
+  public:
+    explicit MissingRanges(const Sequence& sequence) : sequence_(sequence) {}
+
+    // Slots come in order of their triggers.
+    void add(const MissingSlot& slot);
+
+    // [{"first_trigger", "count", "cycle", "slot", "kind", "why", "witnesses": {"board", "camera", "optical"}}]; cycle,
+    // slot and kind are the first trigger's.
+    nlohmann::json to_json() const;
+
+  private:
+    struct Range {
+        MissingSlot first;
+        uint64_t count;
+    };
+    const Sequence& sequence_;
+    std::vector<Range> ranges_;
+};
+
+}  // namespace ols

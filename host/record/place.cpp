@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: MIT
+// Stretches, runs and landmarks.
+#include "record/place.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace ols {
+
+namespace {
+
+std::vector<SlotKind> kinds_of(const Sequence& sequence) {
+    std::vector<SlotKind> kinds;
+    for (const Slot& slot : sequence.slots) kinds.push_back(slot.kind);
+    return kinds;
+}
+
+}  // namespace
+
+FramePlacer::FramePlacer(const Sequence& sequence, const IdentifyOptions& options)
+    : trigger_count_(sequence.trigger_count()),
+      group_slots_(size_t(sequence.config.group_slots)),
+      period_ns_(1e9 * sequence.slots.front().period_ticks / double(tick_hz)),
+      options_(options),
+      window_(options.reorder_frames, period_ns_),
+      code_(kinds_of(sequence)) {}
+
+void FramePlacer::add(FrameWitness frame) {
+    if (frame.arrival < bound_arrivals_) frame.fired_before = bound_fired_;
+    const FrameWitness copy = frame;
+    switch (window_.add(std::move(frame))) {
+        case ReorderWindow::Arrival::duplicate:
+            ++duplicates_;
+            refuse(copy, "duplicate: the camera delivered this id and time before");
+            break;
+        case ReorderWindow::Arrival::too_late: refuse(copy, "late: delivered after its reorder window"); break;
+        case ReorderWindow::Arrival::in_time: break;
+    }
+    while (auto next = window_.take(false)) process(std::move(*next));
+}
+
+void FramePlacer::bound(uint64_t arrivals, uint64_t fired) {
+    const auto tell = [&](FrameWitness& frame) {
+        if (frame.arrival < arrivals) frame.fired_before = std::min(frame.fired_before, fired);
+    };
+    window_.for_each(tell);
+    if (stray_) tell(*stray_);
+    for (Pending& pending : unlocked_) tell(pending.frame);
+    bound_arrivals_ = arrivals;
+    bound_fired_ = fired;
+}
+
+void FramePlacer::end() {
+    while (auto next = window_.take(true)) process(std::move(*next));
+    if (stray_) refuse(*stray_, "its time fits no trigger");
+    stray_.reset();
+    end_stretch();
+}
+
+void FramePlacer::process(FrameWitness frame) {
+    if (!grid_) return begin_stretch(std::move(frame), "before the camera's first frame");
+    if (append(frame)) {
+        if (stray_) refuse(*stray_, "its time fits no trigger");
+        stray_.reset();
+        return;
+    }
+    // Two frames in a row that fit each other but not the grid: the camera's clock was set anew.
+    if (stray_ && stray_->epoch == frame.epoch) {
+        const TriggerGrid stray_grid(period_ns_, stray_->stamp.timestamp_ns, code_.cycle_slots());
+        const auto steps = stray_grid.steps_to(frame.stamp.timestamp_ns);
+        if (steps && *steps == frame.stamp.frame_id - stray_->stamp.frame_id) {
+            end_stretch();
+            ++camera_restarts_;
+            begin_stretch(std::move(*stray_), "the camera's clock was set anew, and no frame is proved to be this one");
+            stray_.reset();
+            append(frame);
+            return;
+        }
+    }
+    if (stray_) refuse(*stray_, "its time fits no trigger");
+    stray_ = std::move(frame);
+}
+
+void FramePlacer::begin_stretch(FrameWitness frame, const std::string& gap) {
+    grid_.emplace(period_ns_, frame.stamp.timestamp_ns, code_.cycle_slots());
+    last_stamp_ = frame.stamp;
+    last_epoch_ = frame.epoch;
+    last_position_ = 0;
+    locked_ = false;
+    next_attempt_ = code_.cycle_slots();
+    place({std::move(frame), 0, true, gap});
+}
+
+// Adds a frame to the stretch if its time lies on the grid and the sequence has a trigger there.
+bool FramePlacer::append(FrameWitness& frame) {
+    const auto steps = grid_->steps_to(frame.stamp.timestamp_ns);
+    if (!steps || lowest_first_counter() + last_position_ + *steps >= trigger_count_) return false;
+    grid_->advance(*steps, frame.stamp.timestamp_ns);
+    const bool restarted = frame.epoch != last_epoch_;
+    const uint64_t id_steps = frame.stamp.frame_id - last_stamp_.frame_id;
+    std::string gap;
+    if (restarted) {
+        ++camera_restarts_;
+        gap = "the camera was restarted";
+    } else if (id_steps == *steps) {
+        gap = "lost: the camera counted the frame and it did not come";
+    } else {
+        gap = "the camera did not count the trigger";
+    }
+    last_stamp_ = frame.stamp;
+    last_epoch_ = frame.epoch;
+    last_position_ += *steps;
+    place({std::move(frame), last_position_, restarted || id_steps != *steps, std::move(gap)});
+    return true;
+}
+
+void FramePlacer::place(Pending pending) {
+    if (locked_) return examine(std::move(pending));
+    unlocked_.push_back(std::move(pending));
+    if (unlocked_.size() > options_.pending_max)
+        give_up_oldest(1, "its place in the cycle was not proved before memory ran out");
+    if (last_position_ + 1 < next_attempt_) return;
+    next_attempt_ = last_position_ + 1 + group_slots_;
+    try_lock();
+}
+
+// The triggers that can have fired by a camera time, one after the other from the start of the board on; clocks may differ by a
+// thousandth.
+uint64_t FramePlacer::triggers_until(uint64_t timestamp_ns) const {
+    constexpr double fastest_clock = 1.001;
+    if (!is_first_stretch_ || timestamp_ns <= options_.camera_ns_at_start) return trigger_count_;
+    return uint64_t(fastest_clock * double(timestamp_ns - options_.camera_ns_at_start) / period_ns_) + 2;
+}
+
+void FramePlacer::try_lock() {
+    std::vector<OpticalCode::Seen> seen;
+    uint64_t end = trigger_count_ - last_position_;  // above the last possible counter of position 0
+    for (const Pending& pending : unlocked_) {
+        if (pending.frame.whole) seen.push_back({pending.position, &pending.frame.summary});
+        if (pending.frame.fired_before < UINT64_MAX)
+            end = std::min(end, pending.frame.fired_before - std::min(pending.frame.fired_before, pending.position));
+        const uint64_t limit = triggers_until(pending.frame.stamp.timestamp_ns);
+        end = std::min(end, limit - std::min(limit, pending.position));
+    }
+    if (end <= next_counter_) return;
+    const OpticalCode::Search found = code_.search(seen, next_counter_, end - 1);
+    if (found.possible == 0) return give_up_oldest(group_slots_, "no place in the cycle fits it");
+    if (found.possible > 1 || !found.proved) return;
+    locked_ = true;
+    first_counter_ = found.counter;
+    // Landmarks from last to first, so that the first of each kind is what the next one is compared with; then what basis
+    // slots can be taken for.
+    const auto learn = [&](bool basis, const Pending& pending) {
+        const uint64_t counter = counter_of(pending);
+        if (pending.frame.whole && (code_.kind_at(counter) == SlotKind::basis) == basis)
+            code_.learn(counter, pending.frame.summary);
+    };
+    for (auto pending = unlocked_.rbegin(); pending != unlocked_.rend(); ++pending) learn(false, *pending);
+    for (const Pending& pending : unlocked_) learn(true, pending);
+    for (Pending& pending : std::exchange(unlocked_, {})) examine(std::move(pending));
+}
+
+void FramePlacer::give_up_oldest(size_t count, const std::string& why) {
+    for (; count > 0 && !unlocked_.empty(); --count) {
+        refuse(unlocked_.front().frame, why);
+        unlocked_.pop_front();
+        if (!unlocked_.empty()) unlocked_.front().gap = why;
+    }
+}
+
+void FramePlacer::examine(Pending pending) {
+    const uint64_t counter = counter_of(pending);
+    if (pending.begins_run) end_run();
+    for (; next_counter_ < counter; ++next_counter_) placements_.push_back({{}, next_counter_, false, pending.gap});
+    next_counter_ = counter + 1;
+    const FrameWitness& frame = pending.frame;
+    const Sight sight = frame.whole ? code_.look(counter, frame.summary) : Sight::silent;
+    pending.optical = sight;
+    if (sight >= Sight::agrees) code_.learn(counter, frame.summary);
+    waiting_.push_back(std::move(pending));
+    if (waiting_.size() > options_.pending_max) refuse_waiting("no landmark proved it before memory ran out");
+    if (sight == Sight::proves) {
+        accept_waiting();
+        proved_ = true;
+    } else if (sight == Sight::disagrees) {
+        refuse_waiting(fmt::format("the optical code disagrees: trigger {} does not look like a {} slot", counter,
+                                   slot_kind_name(code_.kind_at(counter))));
+        proved_ = false;
+    }
+}
+
+void FramePlacer::end_run() {
+    if (proved_)
+        accept_waiting();
+    else
+        refuse_waiting("no landmark proves it: the camera's count broke before and after it");
+    proved_ = false;
+}
+
+void FramePlacer::end_stretch() {
+    if (!locked_ && !unlocked_.empty()) try_lock();
+    if (locked_) end_run();
+    for (const Pending& pending : unlocked_) refuse(pending.frame, "its place in the cycle could not be proved");
+    unlocked_.clear();
+    grid_.reset();
+    is_first_stretch_ = false;
+    locked_ = false;
+}
+
+void FramePlacer::accept_waiting() {
+    for (const Pending& pending : waiting_) {
+        if (pending.frame.whole && code_.kind_at(counter_of(pending)) == SlotKind::basis)
+            code_.learn(counter_of(pending), pending.frame.summary);
+        Placement placement{pending.frame.arrival, counter_of(pending), pending.frame.whole, "", pending.optical};
+        if (!pending.frame.whole) placement.why = "its size or format is not the stage's";
+        placements_.push_back(std::move(placement));
+    }
+    waiting_.clear();
+}
+
+void FramePlacer::refuse_waiting(const std::string& why) {
+    for (const Pending& pending : waiting_)
+        placements_.push_back({pending.frame.arrival, counter_of(pending), false, why, pending.optical});
+    waiting_.clear();
+}
+
+void FramePlacer::refuse(const FrameWitness& frame, const std::string& why) {
+    placements_.push_back({frame.arrival, {}, false, why});
+}
+
+std::vector<Placement> FramePlacer::take_placements() {
+    return std::exchange(placements_, {});
+}
+
+uint64_t FramePlacer::lowest_open() const {
+    return waiting_.empty() ? next_counter_ : counter_of(waiting_.front());
+}
+
+std::optional<uint64_t> FramePlacer::latest_time_of_ns(uint64_t counter) const {
+    if (!grid_) return std::nullopt;
+    return grid_->time_after_ns(int64_t(counter) - int64_t(lowest_first_counter() + last_position_));
+}
+
+std::optional<double> FramePlacer::drift_ppm() const {
+    if (!locked_) return std::nullopt;
+    return grid_->drift_ppm();
+}
+
+}  // namespace ols

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+// Two threads feed one queue, the camera's frames and the board's log; the caller's thread identifies.
+#include "record/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <semaphore>
+#include <thread>
+#include <unordered_map>
+#include <variant>
+
+#include "record/board_log.hpp"
+#include "record/event_queue.hpp"
+
+namespace ols {
+
+namespace {
+
+constexpr int read_pause_ms = 20;
+// After the board's end, looks at a camera that shows no sign of life: 5 s. Only then is the rest given up without the
+// camera's word; a camera that lives says by its watermark when it has delivered everything.
+constexpr int silent_looks_max = 250;
+
+IdentifyOptions options_for(const Sequence& sequence, uint64_t camera_ns_at_start = 0) {
+    IdentifyOptions options;
+    options.camera_ns_at_start = camera_ns_at_start;
+    options.pending_max = sequence.slots.size() + 2 * options.reorder_frames;
+    return options;
+}
+
+struct FrameNews {
+    std::shared_ptr<Frame> frame;
+    FrameWitness witness;
+};
+struct CameraPause {
+    uint64_t watermark_ns;  // everything before it has been read
+    bool closed;
+};
+struct LogEnd {
+    std::string why;
+};
+using Event = std::variant<FrameNews, CameraPause, LogNews, LogEnd>;
+
+// Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
+bool is_whole(const Frame& frame, const CameraConfig& config) {
+    const size_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+    return frame.width == uint32_t(config.width) && frame.height == uint32_t(config.height) &&
+           frame.cfa == config.cfa &&
+           frame.pitch_bytes >= frame.width * size_t(samples_per_pixel(frame.cfa)) * sample_bytes &&
+           frame.pitch_bytes % sample_bytes == 0 && frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
+}
+
+std::string describe(const Frame& frame) {
+    const char* names[] = {"none", "rggb", "bggr", "grbg", "gbrg", "rgb"};
+    const char* cfa = size_t(frame.cfa) < std::size(names) ? names[size_t(frame.cfa)] : "unknown";
+    return fmt::format("{} x {} pixels, cfa {}, {} bytes", frame.width, frame.height, cfa, frame.samples.size());
+}
+
+// Reads the camera into the queue until told to end. The number of frames in memory is bounded here, where they enter.
+class CameraReader {
+  public:
+    CameraReader(Camera& camera, const CameraConfig& config, std::optional<double> black_counts, size_t frames_max,
+                 EventQueue<Event>& queue)
+        : camera_(camera),
+          config_(config),
+          black_counts_(black_counts),
+          room_(std::make_shared<Room>(ptrdiff_t(frames_max))),
+          queue_(queue) {
+        thread_ = std::thread([this] { read(); });
+    }
+    ~CameraReader() {
+        end_ = true;
+        thread_.join();
+    }
+    const std::atomic<uint64_t>& arrivals() const { return arrivals_; }
+
+  private:
+    using Room = std::counting_semaphore<>;
+
+    void read() {
+        while (!end_) {
+            if (!room_->try_acquire_for(std::chrono::milliseconds(read_pause_ms))) continue;
+            const bool closed = camera_.closed();
+            const uint64_t watermark_ns = camera_.watermark_ns();
+            auto frame = camera_.read(read_pause_ms);
+            if (frame) {
+                enqueue(std::move(*frame));
+                continue;
+            }
+            room_->release();
+            queue_.push(CameraPause{watermark_ns, closed});
+            if (closed) return;
+        }
+    }
+
+    void enqueue(Frame frame) {
+        FrameNews news;
+        news.witness.arrival = arrivals_++;
+        news.witness.stamp = frame.stamp;
+        news.witness.whole = is_whole(frame, config_);
+        if (news.witness.whole)
+            news.witness.summary = summarize_frame(frame, black_counts_.value_or(frame.black), config_.noise);
+        news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = room_](Frame* last) {
+            delete last;
+            room->release();
+        });
+        queue_.push(std::move(news));
+    }
+
+    Camera& camera_;
+    const CameraConfig& config_;
+    const std::optional<double> black_counts_;
+    const std::shared_ptr<Room> room_;  // frames may outlive the reader
+    EventQueue<Event>& queue_;
+    std::atomic<uint64_t> arrivals_ = 0;
+    std::atomic<bool> end_ = false;
+    std::thread thread_;
+};
+
+// The caller's side: identification and its account.
+class Recording {
+  public:
+    Recording(const Sequence& sequence, const RecordSink& sink, uint64_t camera_ns_at_start)
+        : sequence_(sequence), sink_(sink), identifier_(sequence, options_for(sequence, camera_ns_at_start)) {
+        report_.slots_total = sequence.trigger_count();
+    }
+
+    void handle(Event event) {
+        std::visit([this](auto& news) { take(std::move(news)); }, event);
+        hand_on();
+    }
+    bool finished() const { return finished_; }
+    RecordReport report() const {
+        RecordReport report = report_;
+        report.duplicates = identifier_.placer().duplicates();
+        report.camera_restarts = identifier_.placer().camera_restarts();
+        return report;
+    }
+
+  private:
+    void take(FrameNews news) {
+        ++report_.frames;
+        if (!news.witness.whole && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
+        silent_looks_ = 0;
+        frames_[news.witness.arrival] = std::move(news.frame);
+        identifier_.add_frame(std::move(news.witness));
+    }
+    void take(LogNews news) {
+        fired_ = std::max(fired_, news.next_counter);
+        identifier_.add_log(news.entries, news.next_counter, news.arrivals);
+    }
+    void take(LogEnd end) {
+        report_.board_end = end.why;
+        identifier_.end_log(end.why);
+        log_ended_ = true;
+        if (camera_closed_) finish();
+    }
+    void take(CameraPause pause) {
+        report_.clock_drift_ppm = identifier_.placer().drift_ppm().value_or(report_.clock_drift_ppm);
+        silent_looks_ = pause.watermark_ns == last_watermark_ns_ ? silent_looks_ + 1 : 0;
+        last_watermark_ns_ = pause.watermark_ns;
+        camera_closed_ = pause.closed;
+        if (!log_ended_) return;  // the board still tells of triggers whose frames came
+        if (pause.closed || has_delivered_all(pause.watermark_ns) || silent_looks_ > silent_looks_max) finish();
+    }
+    void finish() {
+        identifier_.end_frames();
+        finished_ = true;
+    }
+
+    // By the camera's own word: its watermark is past the last trigger that was fired.
+    bool has_delivered_all(uint64_t watermark_ns) const {
+        if (fired_ == 0) return true;
+        const auto last_ns = identifier_.placer().latest_time_of_ns(fired_ - 1);
+        return last_ns && watermark_ns > *last_ns;
+    }
+
+    void hand_on() {
+        for (Verdict& verdict : identifier_.take_verdicts()) {
+            if (verdict.kind == Verdict::missing) {
+                ++report_.slots_missing;
+                sink_.missing(verdict.slot);
+                continue;
+            }
+            const auto found = frames_.find(verdict.arrival);
+            const std::shared_ptr<Frame> frame = std::move(found->second);
+            frames_.erase(found);
+            if (verdict.kind == Verdict::discarded) {
+                ++report_.frames_discarded;
+                continue;
+            }
+            frame->identified = true;
+            frame->cycle = verdict.entry.cycle;
+            frame->slot = verdict.entry.slot;
+            frame->tick = verdict.entry.rise_ticks;
+            frame->exposure_ticks = sequence_.slots[frame->slot].exposure_ticks;
+            sink_.frame(frame);
+        }
+        sink_.progress(identifier_.decided(), report_.slots_total);
+    }
+
+    const Sequence& sequence_;
+    const RecordSink& sink_;
+    Identifier identifier_;
+    std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
+    RecordReport report_;
+    uint64_t fired_ = 0, last_watermark_ns_ = 0;
+    int silent_looks_ = 0;
+    bool log_ended_ = false, camera_closed_ = false, finished_ = false;
+};
+
+}  // namespace
+
+Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
+    if (board.info().tick_hz != tick_hz)
+        return fail(
+            fmt::format("the board's clock runs at {} Hz and not at {}: flash the firmware of this release: "
+                        "make flash",
+                        uint32_t(board.info().tick_hz), tick_hz));
+    if (const auto status = board.status(); !status.ok())
+        return status.error();
+    else if (status->state == OLS_STATE_FAULT)
+        return fail("the board has a latched fault, " + fault_text(*status) +
+                    "; when the cause is gone, run `stagectl status --clear-fault`");
+    const auto program = encode_program(sequence, stage);
+    if (Status s = board.load(program, uint16_t(sequence.slots.size()), uint16_t(stage.chain_bits),
+                              uint32_t(sequence.config.cycles), sequence.config.playback);
+        !s.ok())
+        return s;
+    if (Status s = board.arm(sequence.config.playback); !s.ok()) return s;
+    return board.start();
+}
+
+size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
+    return (3 + cycles_kept) * sequence.slots.size() + 4 * options_for(sequence).reorder_frames;
+}
+
+Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
+                                 std::optional<double> black_counts, const RecordSink& sink,
+                                 const std::atomic<bool>& stop) {
+    while (camera.read(0)) {
+    }  // frames of an earlier take
+    const uint64_t dropped_before = camera.dropped(), camera_ns_at_start = camera.watermark_ns();
+    if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
+
+    const size_t in_flight = frames_in_flight(sequence, sink.cycles_kept);
+    EventQueue<Event> queue(in_flight + 64);
+    Recording recording(sequence, sink, camera_ns_at_start);
+    {
+        CameraReader reader(camera, stage.cameras[0], black_counts, in_flight, queue);
+        BoardLog log(
+            board, reader.arrivals(), stop, [&](LogNews news) { queue.push(std::move(news)); },
+            [&](std::string why) { queue.push(LogEnd{std::move(why)}); });
+        while (!recording.finished()) recording.handle(std::move(*queue.pop()));
+        queue.close();
+    }
+    RecordReport report = recording.report();
+    report.frames_dropped_by_camera = camera.dropped() - dropped_before;
+    return report;
+}
+
+}  // namespace ols

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// Take: records a sequence and writes its archive, target by target, while it plays.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+
+#include "archive/archive.hpp"
+#include "develop/develop.hpp"
+#include "develop/motion_developer.hpp"
+#include "record/recorder.hpp"
+#include "stage/calibration.hpp"
+
+namespace ols {
+
+struct TakeReport {
+    RecordReport record;
+    int targets_written = 0, targets_missing = 0;
+    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, and not solved.
+    double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
+    // Where the time went: of the whole take, and busy in each thread.
+    double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
+    MotionDeveloper::Times seconds_motion;  // parts of seconds_develop, of a performance
+    // Share of a target's pixels where motion compensation failed, in the worst target.
+    double misaligned_share = 0;
+    std::string write_error;  // the first target that could not be written, and why; empty when all were
+};
+
+// What becomes of slots that were lost and samples that saturated.
+struct TakeMasks {
+    // Lost slots of the basis take the frames of the same slot in the cycle before and the one after, their mean where both
+    // are there: for subjects that hold still. Costs a cycle of delay and the memory of two more.
+    bool fill_from_neighbours = false;
+    Estimate estimate = Estimate::none;
+};
+
+// Which targets a take has: one a cycle, of the cycle's frames, for subjects that hold still; or a performance.
+struct TakeTargets {
+    // A target at every so manieth tracking frame, of the frames nearest to it (lazy_basis.hpp). 0: one a cycle.
+    int every = 0;
+    MotionQuality quality = {};  // of a performance
+};
+
+// Threads: the camera's, the board's, the caller's, which identifies, one that develops, one that writes. Each hands on
+// one thing at a time, and developing runs on all processors; memory is bounded by frames_in_flight() frames and two
+// targets. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
+// `identified` sees every frame that has its slot, in the caller's thread. `info` gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
+// Errors: the board cannot be started. Anything later is in the report and in the archive.
+Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
+                            const Calibration& calibration, const TakeMasks& masks, const TakeTargets& targets,
+                            ArchiveWriter& archive, const std::atomic<bool>& stop,
+                            const std::function<void(const Frame&)>& identified,
+                            const std::function<void(uint64_t decided, uint64_t total)>& progress);
+
+// The mean black level of a calibration, for the optical code; nothing for a nominal one.
+std::optional<double> measured_black(const Calibration& calibration);
+
+}  // namespace ols
