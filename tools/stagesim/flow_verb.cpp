@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "inputs.hpp"
-#include "true_flow.hpp"
+#include "render/true_flow.hpp"
+#include "run/inputs.hpp"
 #include "verbs.hpp"
 
 namespace ols {

@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "inputs.hpp"
-#include "plan.hpp"
+#include "run/inputs.hpp"
+#include "run/plan.hpp"
 #include "verbs.hpp"
 
 namespace ols {

@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "effects/vignetting.hpp"
 #include "image/exr.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
-#include "inputs.hpp"
 #include "relight/lamp_weights.hpp"
-#include "renderer.hpp"
+#include "render/effects/vignetting.hpp"
+#include "render/renderer.hpp"
+#include "run/inputs.hpp"
 #include "verbs.hpp"
 
 namespace ols {

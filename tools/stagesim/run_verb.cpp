@@ -8,12 +8,12 @@
 #include <filesystem>
 #include <thread>
 
-#include "board_process.hpp"
 #include "image/whole_file.hpp"
-#include "inputs.hpp"
-#include "plan.hpp"
+#include "run/board_process.hpp"
+#include "run/inputs.hpp"
+#include "run/plan.hpp"
+#include "run/virtual_camera.hpp"
 #include "verbs.hpp"
-#include "virtual_camera.hpp"
 
 namespace ols {
 

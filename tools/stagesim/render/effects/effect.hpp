@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// An effect is one part of the physics that is computed only when something calls for it (a shadow needs something that
+// casts it). One nobody calls for is not even made: it costs nothing and the picture has the same bits as with it
+// disabled. To add one: derive, and list it in effects.cpp.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "image/frame.hpp"
+#include "render/placed_lamp.hpp"
+#include "render/visible_points.hpp"
+#include "scene/geometry.hpp"
+#include "stage/stage.hpp"
+
+namespace ols {
+
+// What an effect looks at to see whether it is called for.
+struct Setup {
+    const Scene& scene;
+    const StageConfig& stage;
+    const CameraConfig& camera;
+    bool camera_model = true;  // off: linear light without noise, mosaic, quantisation and saturation
+};
+
+class Effect {
+  public:
+    virtual ~Effect() = default;
+    virtual const char* name() const = 0;
+    // Who calls for it, for `plan`; empty when nobody does.
+    virtual std::string caller(const Setup& setup) const = 0;
+    // What one evaluation is: "ray", "sample", ...
+    virtual const char* evaluation() const = 0;
+
+    uint64_t evaluations() const { return evaluations_.load(); }
+    void count(uint64_t evaluations) { evaluations_ += evaluations; }
+
+  private:
+    std::atomic<uint64_t> evaluations_ = 0;
+};
+
+// One lamp's light on one packet of points on its way to the camera.
+struct LightPacket {
+    const VisiblePoints& points;
+    uint32_t first;  // of the packet, in points
+    const PlacedLamp& lamp;
+    uint32_t lamp_index;
+    const Geometry& geometry;
+
+    // 1 where the lamp is meant to light the point at all, 0 elsewhere (board lamps and subject).
+    alignas(32) float receives[packet_size];
+    // Set up for a lamp at infinity: direction and cosine only.
+    alignas(32) float to_lamp[3][packet_size];  // unit
+    alignas(32) float distance_m[packet_size];
+    alignas(32) float irradiance[packet_size];  // on the surface, in units of the lamp's at its aim, facing it
+    // pi L / E: what the camera sees, in units of a white matte surface facing the lamp at its aim.
+    alignas(32) float reflected[3][packet_size];
+};
+
+// Light from lamp to camera. `prepare` is called once for a scene at one moment; `apply` then from many threads.
+class LightEffect : public Effect {
+  public:
+    // arrive: changes how light arrives (direction, irradiance); reflect: adds to what leaves towards the camera.
+    enum class Stage { arrive, reflect };
+    virtual Stage stage() const = 0;
+    virtual void prepare(const VisiblePoints&, const std::vector<PlacedLamp>&, const Geometry&) {}
+    // All packets of a chunk of points under one lamp. Returns how many evaluations it made.
+    virtual uint64_t apply(std::span<LightPacket> packets) const = 0;
+};
+
+// An effect that looks at one packet at a time.
+class PacketEffect : public LightEffect {
+  public:
+    uint64_t apply(std::span<LightPacket> packets) const override {
+        uint64_t evaluations = 0;
+        for (LightPacket& packet : packets) evaluations += apply_packet(packet);
+        return evaluations;
+    }
+    virtual uint32_t apply_packet(LightPacket& packet) const = 0;
+};
+
+// An exposure on the sensor: counts above black, channels as the camera delivers them (1 mosaic, 3 RGB).
+struct Exposure {
+    Image counts;
+    uint32_t camera = 0;
+    uint64_t number = 0;  // counts the camera's exposures: the key of the noise
+};
+
+class SensorEffect : public Effect {
+  public:
+    virtual void apply(Exposure& exposure) = 0;
+};
+
+}  // namespace ols

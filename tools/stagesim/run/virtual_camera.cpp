@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// From exposures to stamped frames.
+#include "run/virtual_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace ols {
+
+uint64_t camera_time_ns(const CameraClock& clock, uint64_t tick) {
+    // The drift is added to an exact product, so that no digit of a long recording is lost.
+    const uint64_t board_ns = tick * 8;
+    const int64_t drift_ns = std::llround(double(board_ns) * clock.drift_ppm * 1e-6);
+    return uint64_t(clock.offset_ns + int64_t(board_ns) + drift_ns);
+}
+
+Frame make_frame(const Exposure& exposure, const CameraConfig& camera, const EffectSet& effects) {
+    const Image& counts = exposure.counts;
+    const bool whole_counts = effects.active("quantisation");
+    Frame frame;
+    frame.camera = exposure.camera;
+    frame.width = uint32_t(counts.width), frame.height = uint32_t(counts.height);
+    frame.cfa = counts.channels == 3 ? Cfa::rgb : camera.cfa;
+    frame.format = whole_counts ? PixelFormat::u16 : PixelFormat::f32;
+    frame.black = whole_counts ? float(camera.black) : 0;
+    frame.white = whole_counts ? float(camera.white) : std::numeric_limits<float>::max();
+    const size_t sample_bytes = whole_counts ? sizeof(uint16_t) : sizeof(float);
+    frame.pitch_bytes = uint32_t(counts.width * counts.channels * sample_bytes);
+    frame.samples.resize(counts.data.size() * sample_bytes);
+    if (whole_counts) {
+        auto* out = reinterpret_cast<uint16_t*>(frame.samples.data());
+        for (size_t i = 0; i < counts.data.size(); ++i) out[i] = uint16_t(counts.data[i]);
+    } else {
+        std::memcpy(frame.samples.data(), counts.data.data(), frame.samples.size());
+    }
+    return frame;
+}
+
+uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled) {
+    const EffectSet effects(setup, disabled);
+    const uint64_t samples = uint64_t(setup.camera.width) * setup.camera.height * (effects.mosaic() ? 1 : 3);
+    return samples * (effects.active("quantisation") ? sizeof(uint16_t) : sizeof(float));
+}
+
+VirtualCamera::VirtualCamera(const Setup& setup, const std::set<std::string>& disabled, uint32_t index, RingWriter ring,
+                             const std::string& frames_path, const std::vector<Fault>& faults, bool wait_for_reader,
+                             const std::atomic<bool>& cancelled)
+    : setup_(setup),
+      renderer_(setup, disabled),
+      index_(index),
+      ring_(std::move(ring)),
+      frames_file_(frames_path),
+      delivery_(faults, index),
+      wait_for_reader_(wait_for_reader),
+      cancelled_(cancelled),
+      clock_(setup.scene.clock) {}
+
+void VirtualCamera::expose(const ExposureMessage& message) {
+    const uint64_t trigger = triggers_++;
+    if (trigger == 0) first_rise_ = message.rise;
+    if (const Fault* restart = delivery_.find(FaultKind::restart_camera, trigger)) {
+        next_frame_id_ = 1;
+        if (!restart->keep_clock) clock_epoch_tick_ = message.rise, clock_.offset_ns = 0;
+    }
+    if (delivery_.strikes(FaultKind::drop_trigger, trigger)) return;
+
+    const double middle_us = (double(message.rise - first_rise_) + double(message.fall - first_rise_)) / 2;
+    const std::vector<double> lit_us = lit_microseconds(message, setup_.stage);
+    const Exposure exposure = renderer_.expose(lit_us, middle_us * microseconds_per_tick, trigger, index_);
+    Frame frame = make_frame(exposure, setup_.camera, renderer_.effects());
+    frame.stamp = {next_frame_id_++, camera_time_ns(clock_, message.rise - clock_epoch_tick_)};
+    write_truth(frame.stamp, trigger, message.rise, lit_us);
+    delivery_.send(std::move(frame), trigger, [this](Frame f) { deliver(std::move(f)); });
+}
+
+void VirtualCamera::write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick,
+                                const std::vector<double>& lit_us) {
+    frames_file_ << fmt::format(R"({{"frame_id":{},"timestamp_ns":{},"trigger":{},"tick":{},"lit":[)", stamp.frame_id,
+                                stamp.timestamp_ns, trigger, tick);
+    const char* comma = "";
+    for (size_t lamp = 0; lamp < lit_us.size(); ++lamp) {
+        if (lit_us[lamp] == 0) continue;
+        frames_file_ << comma << lamp;
+        comma = ",";
+    }
+    frames_file_ << "]}\n" << std::flush;
+}
+
+void VirtualCamera::deliver(Frame frame) {
+    waiting_since_ns_ = std::chrono::steady_clock::now().time_since_epoch().count();
+    const bool taken = ring_.write(frame, wait_for_reader_, cancelled_);
+    waiting_since_ns_ = 0;
+    ++(taken ? delivered_ : dropped_);
+}
+
+void VirtualCamera::set_now(uint64_t tick) {
+    ring_.set_watermark(camera_time_ns(clock_, tick - std::min(tick, clock_epoch_tick_)));
+}
+
+void VirtualCamera::finish() {
+    delivery_.finish([this](Frame f) { deliver(std::move(f)); });
+    ring_.close();
+}
+
+}  // namespace ols
