@@ -57,12 +57,27 @@ using PlaneSource = std::function<Status(int plane, const Box& box, float* out)>
 // "lamp_000": the layer of a lamp in an archive of `count` lamps; more digits beyond a thousand, so that names sort.
 std::string lamp_layer(int lamp, int count);
 
+// Only one process writes an archive at a time: a second is refused, until the first has ended, however it ended.
 class ArchiveWriter {
   public:
     // Makes the directory with its manifest, lights and journal, or leaves nothing. A path that exists is refused by
-    // name; `overwrite` removes it first, but only files that an archive consists of: a stranger among them is an
-    // error.
+    // name; `overwrite` replaces it once the new one is there, but only if it consists of an archive's files: a stranger
+    // among them is an error.
     static Result<ArchiveWriter> create(const std::string& path, const TakeInfo& info, bool overwrite = false);
+
+    // The same, but the archive is made beside `path` (as `.NAME.recording`) and what is there stays until take_place() or
+    // finish(). A writer that is destroyed before leaves nothing.
+    static Result<ArchiveWriter> create_beside(const std::string& path, const TakeInfo& info, bool overwrite);
+
+    // Gives the archive its name and removes the one it replaces. After an error it stays beside and may be written on;
+    // finish() tries again.
+    Status take_place();
+
+    // Where the archive's files are now.
+    std::string folder() const;
+
+    // Journals how many targets a camera is to have, so that those of which nothing came to be known are named, too.
+    Status expect_targets(uint32_t camera, uint32_t count);
 
     // Writes a target to a temporary name, fsyncs, renames, then journals it; for one thread at a time. After an error
     // (a full disk, say) neither file nor journal line stays, what was written before is untouched, and the writer may
@@ -74,14 +89,19 @@ class ArchiveWriter {
     // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.
     Status write_target(const Target& head, const PlaneSource& source);
 
-    // Journals a target that could not be made, and why.
+    // Journals a target that could not be made, and why; room for it is set aside even on a full disk, for a shortened
+    // reason and without `detail`. What cannot be journaled now is at the next chance, finish() at the latest.
     Status note_missing_target(uint32_t camera, uint32_t index, const std::string& why,
                                const nlohmann::json& detail = {});
+
+    // The same for all targets from `first` to `last`, in one line.
+    Status note_missing_targets(uint32_t camera, uint32_t first, uint32_t last, const std::string& why);
 
     // Adds to the manifest's `extra` (merged by key, RFC 7396); on the disk after finish().
     void add_to_manifest(const nlohmann::json& extra);
 
-    // Completes the manifest and journals the end; an archive without it reads as unfinished.
+    // Completes the manifest, for which room was set aside, and journals the end; an archive without it reads as
+    // unfinished. Calls take_place().
     Status finish();
 
     ArchiveWriter(ArchiveWriter&&) noexcept;
@@ -95,12 +115,16 @@ class ArchiveWriter {
 
 struct TargetEntry {
     uint32_t camera = 0, index = 0;
+    uint32_t last = 0;        // of a run of missing targets, which begins at `index`; else the index
     std::string file;         // relative to the archive; empty for a missing target
     std::string why_missing;  // empty for a finished one
     nlohmann::json detail;    // provenance of a finished target, detail of a missing one
     uint64_t bytes = 0;
     uint32_t crc32 = 0;
 };
+
+// "target 3", or of a run "targets 3 to 9".
+std::string target_words(const TargetEntry& entry);
 
 // What verify found: finished targets whose files are as the journal says, and one line for everything else.
 struct Verification {
@@ -116,7 +140,9 @@ class ArchiveReader {
     const TakeInfo& info() const;
     const nlohmann::json& manifest() const;
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
-    bool finished() const;                            // the journal has its end
+    // Runs of targets that were to come and are neither: the recording was interrupted. Empty if how many is not known.
+    std::vector<TargetEntry> undecided() const;
+    bool finished() const;  // the journal has its end
 
     // Everything of a target but its samples: size, colour filter, missing lamps, provenance, times of its motion.
     Result<Target> read_head(uint32_t camera, uint32_t index) const;

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 namespace ols {
@@ -36,25 +37,70 @@ Status rename_durably(const std::string& from, const std::string& to) {
     return sync_directory(std::filesystem::path(to).parent_path());
 }
 
-Status write_file_durably(const std::string& path, const std::string& text) {
-    const std::string temporary = path + unfinished_suffix;
-    const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (fd < 0) return disk_error("write", path, errno);
-    int error = 0;
-    for (size_t done = 0; done < text.size() && error == 0;) {
+Status sync_file(const std::string& path) {
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return disk_error("open", path, errno);
+    const int error = fsync(fd) == 0 ? 0 : errno;
+    ::close(fd);
+    if (error != 0) return disk_error("sync", path, error);
+    return Done{};
+}
+
+namespace {
+
+// 0, or the error number of the write that failed.
+int write_all(int fd, const std::string& text) {
+    for (size_t done = 0; done < text.size();) {
         const ssize_t n = ::write(fd, text.data() + done, text.size() - done);
         if (n > 0)
             done += size_t(n);
         else if (n < 0 && errno != EINTR)
-            error = errno;
+            return errno;
     }
-    if (error == 0 && fsync(fd) != 0) error = errno;
-    if (::close(fd) != 0 && error == 0) error = errno;
+    return 0;
+}
+
+}  // namespace
+
+Status write_file_durably(const std::string& path, const std::string& text) {
+    auto file = ReservedFile::create(path, 0);
+    if (!file) return file.error();
+    return file->write(path, text);
+}
+
+int reserve_room(int fd, int64_t size, int64_t bytes) {
+    if (bytes == 0 || fallocate(fd, FALLOC_FL_KEEP_SIZE, size, bytes) == 0) return 0;
+    // Full disks only; others cannot do it, or a limit of the process forbids what may never be needed.
+    return errno == ENOSPC || errno == EDQUOT || errno == EIO ? errno : 0;
+}
+
+ReservedFile::ReservedFile(ReservedFile&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+ReservedFile::~ReservedFile() {
+    if (fd_ >= 0) ::close(fd_);
+}
+
+Result<ReservedFile> ReservedFile::create(const std::string& path, int64_t bytes) {
+    const std::string name = path + unfinished_suffix;
+    ReservedFile file(::open(name.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (file.fd_ < 0) return disk_error("write", path, errno);
+    if (const int error = reserve_room(file.fd_, 0, bytes); error != 0) {
+        unlink(name.c_str());
+        return disk_error("set room aside for", path, error);
+    }
+    return file;
+}
+
+Status ReservedFile::write(const std::string& path, const std::string& text) {
+    const std::string name = path + unfinished_suffix;
+    int error = write_all(fd_, text);
+    if (error == 0 && ftruncate(fd_, off_t(text.size())) != 0) error = errno;  // the room that is left is given back
+    if (error == 0 && fsync(fd_) != 0) error = errno;
+    if (::close(std::exchange(fd_, -1)) != 0 && error == 0) error = errno;
     if (error != 0) {
-        unlink(temporary.c_str());
+        unlink(name.c_str());
         return disk_error("write", path, error);
     }
-    return rename_durably(temporary, path);
+    return rename_durably(name, path);
 }
 
 Checksum checksum_text(const std::string& text) {

@@ -18,11 +18,35 @@ Error disk_error(const std::string& action, const std::string& path, int error_n
 // Writes all of `text`; a reader sees the old file or the new one, never a part.
 Status write_file_durably(const std::string& path, const std::string& text);
 
+// Makes what another function wrote into a file last.
+Status sync_file(const std::string& path);
+
 // Gives a file that is already synced its final name, for good.
 Status rename_durably(const std::string& from, const std::string& to);
 
 // Makes a directory's entries (new, renamed, removed) last.
 Status sync_directory(const std::string& path);
+
+// Sets `bytes` of a disk aside behind the first `size` of an open file, which keeps its size: writes into them do not meet a
+// full disk. 0 where that was done or the file system cannot do it, else the error number.
+int reserve_room(int fd, int64_t size, int64_t bytes);
+
+// A file that will be written once, at the end, when the disk may be full: its room is set aside before.
+class ReservedFile {
+  public:
+    // Makes the file `path` + unfinished_suffix, empty, with room for `bytes`.
+    static Result<ReservedFile> create(const std::string& path, int64_t bytes);
+
+    // Writes all of `text` and gives the file its name `path`, which may have moved with its folder since.
+    Status write(const std::string& path, const std::string& text);
+
+    ReservedFile(ReservedFile&& other) noexcept;
+    ~ReservedFile();
+
+  private:
+    explicit ReservedFile(int fd) : fd_(fd) {}
+    int fd_ = -1;
+};
 
 struct Checksum {
     uint64_t bytes = 0;

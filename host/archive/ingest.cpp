@@ -218,7 +218,7 @@ TakeInfo take_info(const IngestOptions& options, const std::vector<LightPosition
 
 Status write_archive(const IngestOptions& options, const TakeInfo& info, const Pictures& pictures,
                      std::vector<uint32_t> mask) {
-    auto writer = ArchiveWriter::create(options.output, info, options.overwrite);
+    auto writer = ArchiveWriter::create_beside(options.output, info, options.overwrite);
     if (!writer) return writer.error();
     Target head;
     head.width = pictures.width;
@@ -231,12 +231,7 @@ Status write_archive(const IngestOptions& options, const TakeInfo& info, const P
         const int lamp = plane / planes, color = pictures.in_color[lamp] ? plane % planes : 0;
         return pictures.spool->read(lamp * 3 + color, box, out);
     });
-    if (written) written = writer->finish();
-    if (!written) {
-        std::error_code ignored;
-        fs::remove_all(options.output, ignored);
-    }
-    return written;
+    return written ? writer->finish() : written;
 }
 
 }  // namespace

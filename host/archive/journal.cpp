@@ -31,25 +31,48 @@ std::optional<Checksum> checksum_from_json(const nlohmann::json& json) {
     return sum;
 }
 
-JournalWriter::JournalWriter(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
+namespace {
+
+// Some hundred short lines: targets that a full disk took, one by one or in runs, and the end.
+constexpr int64_t room_set_aside = 64 << 10;
+
+// Text from outside may not be UTF-8; it is replaced, not thrown at.
+std::string text_of(const nlohmann::json& line) {
+    return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
 JournalWriter::JournalWriter(JournalWriter&& other) noexcept
-    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_), broken_(other.broken_) {}
+    : fd_(std::exchange(other.fd_, -1)), size_(other.size_), broken_(other.broken_) {}
 JournalWriter::~JournalWriter() {
-    if (fd_ >= 0) ::close(fd_);
+    if (fd_ < 0) return;
+    // Truncating a file to its size frees what lies behind it; where it does not, a few kilobytes stay taken.
+    [[maybe_unused]] const int ignored = ftruncate(fd_, size_);
+    ::close(fd_);
 }
 
 Result<JournalWriter> JournalWriter::create(const std::string& path) {
-    const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-    if (fd < 0) return disk_error("make", path, errno);
-    JournalWriter writer(path, fd);
+    JournalWriter writer(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644));
+    if (writer.fd_ < 0) return disk_error("make", path, errno);
     if (const auto synced = sync_directory(std::filesystem::path(path).parent_path()); !synced) return synced.error();
     return writer;
 }
 
 Status JournalWriter::append(const nlohmann::json& line) {
-    if (broken_) return fail("'" + path_ + "' could not be restored after a failed write: nothing more is added to it");
-    // Text from outside may not be UTF-8; it is replaced, not thrown at.
-    const std::string text = line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    return append(text_of(line), room_set_aside);
+}
+
+Status JournalWriter::append_reserved(const nlohmann::json& line) {
+    return append(text_of(line), 0);
+}
+
+Status JournalWriter::append(const std::string& text, int64_t left_aside) {
+    if (broken_)
+        return fail(std::string(journal_name) + " could not be restored after a failed write: it is left alone");
+    if (left_aside > 0)
+        if (const int full = reserve_room(fd_, size_, int64_t(text.size()) + left_aside); full != 0)
+            return disk_error("write", journal_name, full);
     int error = 0;
     for (size_t done = 0; done < text.size() && error == 0;) {
         const ssize_t n = ::write(fd_, text.data() + done, text.size() - done);
@@ -60,8 +83,10 @@ Status JournalWriter::append(const nlohmann::json& line) {
     }
     if (error == 0 && fsync(fd_) != 0) error = errno;
     if (error != 0) {
+        // Shortening a file gives back the room behind it, too; it is taken again at once, as far as the disk has it.
         broken_ = ftruncate(fd_, size_) != 0;
-        return disk_error("write", path_, error);
+        reserve_room(fd_, size_, room_set_aside);
+        return disk_error("write", journal_name, error);
     }
     size_ += int64_t(text.size());
     return Done{};
@@ -73,7 +98,10 @@ std::optional<TargetEntry> target_entry(const nlohmann::json& line, const std::s
     TargetEntry entry;
     entry.camera = line.at("camera").get<uint32_t>();
     entry.index = line.at("index").get<uint32_t>();
+    entry.last = entry.index;
     if (event == "missing") {
+        entry.last = line.value("through", entry.index);
+        if (entry.last < entry.index) return std::nullopt;
         entry.why_missing = line.at("why").get<std::string>();
         entry.detail = line.value("detail", nlohmann::json::object());
         return entry;
@@ -100,6 +128,8 @@ bool take_line(const std::string& text, Journal& journal) {
         } else if (event == "end") {
             journal.ended = true;
             journal.manifest = checksum_from_json(line.at("manifest"));
+        } else if (event == "expect") {
+            journal.expected[line.at("camera").get<uint32_t>()] = line.at("targets").get<uint32_t>();
         } else if (event == "target" || event == "missing") {
             const auto entry = target_entry(line, event);
             if (!entry) return false;
@@ -133,6 +163,26 @@ Result<Journal> read_journal(const std::string& path) {
         return std::pair(a.camera, a.index) < std::pair(b.camera, b.index);
     });
     return journal;
+}
+
+std::vector<TargetEntry> undecided_targets(const Journal& journal) {
+    std::vector<TargetEntry> runs;
+    for (const auto& [camera, count] : journal.expected) {
+        uint64_t next = 0;  // everything before it is decided or in a run
+        const auto add_run_to = [&, camera = camera](uint64_t end) {
+            if (next >= end) return;
+            TargetEntry run;
+            run.camera = camera, run.index = uint32_t(next), run.last = uint32_t(end - 1);
+            runs.push_back(std::move(run));
+        };
+        for (const auto& entry : journal.targets) {
+            if (entry.camera != camera) continue;
+            add_run_to(std::min(entry.index, count));
+            next = std::max(next, uint64_t(entry.last) + 1);
+        }
+        add_run_to(count);
+    }
+    return runs;
 }
 
 }  // namespace ols

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "archive/archive.hpp"
+#include "archive/archive_place.hpp"
 #include "archive/disk.hpp"
 #include "archive/journal.hpp"
 #include "archive/manifest.hpp"
@@ -28,7 +29,7 @@ namespace {
 
 Result<std::string> finished_file(const fs::path& root, const Journal& journal, uint32_t camera, uint32_t index) {
     for (const auto& entry : journal.targets) {
-        if (entry.camera != camera || entry.index != index) continue;
+        if (entry.camera != camera || index < entry.index || entry.last < index) continue;
         if (entry.file.empty())
             return fail(fmt::format("'{}': target {} of camera {} is missing: {}", root.string(), index, camera,
                                     entry.why_missing));
@@ -52,6 +53,12 @@ std::string damage(const fs::path& root, const std::string& file, const Checksum
     return "";
 }
 
+// The room for the manifest of an archive that is being written, or was.
+bool is_set_aside(const fs::path& file) {
+    std::error_code error;
+    return file.filename() == std::string(manifest_name) + unfinished_suffix && fs::file_size(file, error) == 0;
+}
+
 void find_leftovers(const fs::path& root, const Journal& journal, std::vector<std::string>& problems) {
     std::set<std::string> known = {manifest_name, lights_name, journal_name};
     for (const auto& entry : journal.targets) known.insert(entry.file);
@@ -61,7 +68,7 @@ void find_leftovers(const fs::path& root, const Journal& journal, std::vector<st
         if (!entry.is_directory(error)) found.push_back(entry.path().lexically_relative(root).generic_string());
     std::sort(found.begin(), found.end());
     for (const auto& file : found) {
-        if (known.contains(file)) continue;
+        if (known.contains(file) || is_set_aside(root / file)) continue;
         if (file.ends_with(unfinished_suffix))
             problems.push_back(file + ": was not finished; it may be removed");
         else if (file.ends_with(".exr"))
@@ -72,6 +79,11 @@ void find_leftovers(const fs::path& root, const Journal& journal, std::vector<st
 }
 
 }  // namespace
+
+std::string target_words(const TargetEntry& entry) {
+    return entry.last == entry.index ? fmt::format("target {}", entry.index)
+                                     : fmt::format("targets {} to {}", entry.index, entry.last);
+}
 
 ArchiveReader::ArchiveReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
 ArchiveReader::ArchiveReader(ArchiveReader&&) noexcept = default;
@@ -103,6 +115,9 @@ const nlohmann::json& ArchiveReader::manifest() const {
 }
 const std::vector<TargetEntry>& ArchiveReader::targets() const {
     return state_->journal.targets;
+}
+std::vector<TargetEntry> ArchiveReader::undecided() const {
+    return undecided_targets(state_->journal);
 }
 bool ArchiveReader::finished() const {
     return state_->journal.ended;
@@ -158,8 +173,13 @@ Verification ArchiveReader::verify() const {
     check(manifest_name, journal.manifest);
     result.problems.insert(result.problems.end(), journal.problems.begin(), journal.problems.end());
     find_leftovers(root, journal, result.problems);
+    const bool goes_on = !journal.ended && is_being_written(root);
+    for (const auto& run : undecided_targets(journal))
+        result.problems.push_back(
+            fmt::format("camera {}: {} {}", run.camera, target_words(run), goes_on ? "to come" : "never finished"));
     if (!journal.ended)
-        result.problems.push_back(std::string(journal_name) + ": has no end: the recording was interrupted");
+        result.problems.push_back(std::string(journal_name) + ": has no end: the recording " +
+                                  (goes_on ? "goes on" : "was interrupted"));
     return result;
 }
 

@@ -2,12 +2,12 @@
 // ArchiveWriter: every step leaves an archive that reads, whatever happens next.
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <cstring>
+#include <algorithm>
 #include <filesystem>
 #include <set>
 
 #include "archive/archive.hpp"
+#include "archive/archive_place.hpp"
 #include "archive/disk.hpp"
 #include "archive/journal.hpp"
 #include "archive/manifest.hpp"
@@ -17,41 +17,52 @@ namespace ols {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// Room that is set aside for the manifest at the end, which then also says what is missing and why.
+constexpr int64_t manifest_room = 1 << 20;
+// What a shortened line of the journal says of a reason.
+constexpr size_t short_reason_bytes = 160;
+
+// Targets that are missing for one reason.
+struct MissingRun {
+    uint32_t camera = 0, first = 0, last = 0;
+    std::string why;
+    nlohmann::json detail;
+
+    nlohmann::json line() const {
+        nlohmann::json json = {{"camera", camera}, {"index", first}, {"why", why}};
+        if (last > first) json["through"] = last;
+        if (!detail.is_null()) json["detail"] = detail;
+        return json;
+    }
+};
+
+nlohmann::json journal_line(const MissingRun& run) {
+    nlohmann::json line = run.line();
+    line["event"] = "missing";
+    return line;
+}
+
+}  // namespace
+
 struct ArchiveWriter::State {
-    fs::path root;
+    ArchivePlace place;
     TakeInfo info;
     JournalWriter journal;
-    std::set<std::pair<uint32_t, uint32_t>> noted;  // camera and index of targets that the journal has
-    nlohmann::json missing = nlohmann::json::array();
+    ReservedFile manifest;
+    std::set<std::pair<uint32_t, uint32_t>> written = {};  // camera and index
+    std::vector<MissingRun> missing = {}, not_journaled = {};
     bool finished = false;
+
+    bool has(uint32_t camera, uint32_t index) const {
+        return written.contains({camera, index}) || std::ranges::any_of(missing, [&](const MissingRun& run) {
+                   return run.camera == camera && run.first <= index && index <= run.last;
+               });
+    }
 };
 
 namespace {
-
-// Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive.
-bool belongs_to_archive(std::string relative) {
-    if (relative.ends_with(unfinished_suffix)) relative.resize(relative.size() - std::strlen(unfinished_suffix));
-    unsigned camera = 0, index = 0;
-    const int numbers = std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index);
-    if (numbers == 2) return relative == target_file_name(camera, index);
-    if (numbers == 1) return relative == fmt::format("cam{}", camera);
-    return relative == manifest_name || relative == lights_name || relative == journal_name;
-}
-
-Status remove_archive(const fs::path& root) {
-    std::error_code error;
-    if (!fs::exists(root / journal_name, error))
-        return fail("'" + root.string() + "' exists and is not an archive: remove it yourself or choose another name");
-    for (const auto& entry : fs::recursive_directory_iterator(root, error)) {
-        const std::string relative = entry.path().lexically_relative(root).generic_string();
-        if (!belongs_to_archive(relative))
-            return fail("'" + entry.path().string() + "' is not part of an archive: move it before overwriting '" +
-                        root.string() + "'");
-    }
-    if (!error) fs::remove_all(root, error);
-    if (error) return fail("cannot remove '" + root.string() + "': " + error.message());
-    return Done{};
-}
 
 Status check_info(const TakeInfo& info) {
     if (info.lights.empty()) return fail("an archive needs at least one lamp");
@@ -74,8 +85,10 @@ std::string text_of(const nlohmann::json& manifest) {
 
 // Fills the fresh directory; the journal comes last, so that a directory with a journal is an archive.
 Result<JournalWriter> begin_archive(const fs::path& root, const TakeInfo& info) {
-    if (auto s = write_lp((root / lights_name).string(), named_by_layer(info.lights)); !s) return s.error();
-    const auto lights = checksum_file((root / lights_name).string());
+    const std::string lights_path = (root / lights_name).string();
+    if (auto s = write_lp(lights_path, named_by_layer(info.lights)); !s) return s.error();
+    if (auto s = sync_file(lights_path); !s) return s.error();
+    const auto lights = checksum_file(lights_path);
     if (!lights) return lights.error();
     if (auto s = write_file_durably((root / manifest_name).string(), text_of(manifest_of(info))); !s) return s.error();
     auto journal = JournalWriter::create((root / journal_name).string());
@@ -94,23 +107,34 @@ ArchiveWriter::ArchiveWriter(ArchiveWriter&&) noexcept = default;
 ArchiveWriter::~ArchiveWriter() = default;
 
 Result<ArchiveWriter> ArchiveWriter::create(const std::string& path, const TakeInfo& info, bool overwrite) {
+    auto writer = create_beside(path, info, overwrite);
+    if (!writer) return writer;
+    if (const auto placed = writer->take_place(); !placed) return placed.error();
+    return writer;
+}
+
+Result<ArchiveWriter> ArchiveWriter::create_beside(const std::string& path, const TakeInfo& info, bool overwrite) {
     if (const auto checked = check_info(info); !checked) return checked.error();
-    fs::path root = fs::path(path).lexically_normal();
-    if (!root.has_filename()) root = root.parent_path();  // "take.rfa/"
-    std::error_code error;
-    if (fs::exists(root, error)) {
-        if (!overwrite) return fail("'" + root.string() + "' exists: choose another name or overwrite it");
-        if (const auto removed = remove_archive(root); !removed) return removed.error();
-    }
-    if (!fs::create_directory(root, error))
-        return fail("cannot make '" + root.string() + "': " + (error ? error.message() : "it exists") +
-                    "; the folder it lies in must exist");
-    auto journal = begin_archive(root, info);
-    if (!journal) {
-        fs::remove_all(root, error);
-        return journal.error();
-    }
-    return ArchiveWriter(std::make_unique<State>(State{root, info, std::move(*journal), {}, {}, false}));
+    auto place = ArchivePlace::make_beside(path, overwrite);
+    if (!place) return place.error();
+    auto journal = begin_archive(place->folder(), info);
+    if (!journal) return journal.error();
+    auto manifest = ReservedFile::create((place->folder() / manifest_name).string(), manifest_room);
+    if (!manifest) return manifest.error();
+    return ArchiveWriter(
+        std::unique_ptr<State>(new State{std::move(*place), info, std::move(*journal), std::move(*manifest)}));
+}
+
+Status ArchiveWriter::take_place() {
+    return state_->place.take();
+}
+
+std::string ArchiveWriter::folder() const {
+    return state_->place.folder().string();
+}
+
+Status ArchiveWriter::expect_targets(uint32_t camera, uint32_t count) {
+    return state_->journal.append({{"event", "expect"}, {"camera", camera}, {"targets", count}});
 }
 
 Status ArchiveWriter::write_target(const Target& target) {
@@ -139,12 +163,12 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
     State& state = *state_;
     assert(!state.finished && head.width > 0 && head.height > 0);
     const std::string relative = target_file_name(head.camera, head.index);
-    if (state.noted.contains({head.camera, head.index})) return fail("target '" + relative + "' is already noted");
+    if (state.has(head.camera, head.index)) return fail("target '" + relative + "' is already noted");
 
-    const fs::path final_name = state.root / relative, temporary = final_name.string() + unfinished_suffix;
+    const fs::path final_name = state.place.folder() / relative, temporary = final_name.string() + unfinished_suffix;
     std::error_code error;
     if (fs::create_directory(final_name.parent_path(), error))
-        if (auto s = sync_directory(state.root.string()); !s) return s;
+        if (auto s = sync_directory(state.place.folder().string()); !s) return s;
     if (error) return fail("cannot make '" + final_name.parent_path().string() + "': " + error.message());
 
     if (auto s = write_target_file(temporary.string(), state.info, head, source); !s) return s;
@@ -161,7 +185,7 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
         fs::remove(final_name, error);
         return s;
     }
-    state.noted.insert({head.camera, head.index});
+    state.written.insert({head.camera, head.index});
     return Done{};
 }
 
@@ -169,14 +193,24 @@ Status ArchiveWriter::note_missing_target(uint32_t camera, uint32_t index, const
                                           const nlohmann::json& detail) {
     State& state = *state_;
     assert(!state.finished && !why.empty());
-    if (state.noted.contains({camera, index}))
-        return fail("target '" + target_file_name(camera, index) + "' is already noted");
-    const nlohmann::json line = {
-        {"event", "missing"}, {"camera", camera}, {"index", index}, {"why", why}, {"detail", detail}};
-    if (auto s = state.journal.append(line); !s) return s;
-    state.noted.insert({camera, index});
-    state.missing.push_back({{"camera", camera}, {"index", index}, {"why", why}, {"detail", detail}});
-    return Done{};
+    if (state.has(camera, index)) return fail("target '" + target_file_name(camera, index) + "' is already noted");
+    const MissingRun run{camera, index, index, why, detail};
+    state.missing.push_back(run);
+    if (state.journal.append(journal_line(run))) return Done{};
+    const MissingRun shortened{camera, index, index, why.substr(0, short_reason_bytes), {}};
+    const Status noted = state.journal.append_reserved(journal_line(shortened));
+    if (!noted) state.not_journaled.push_back(shortened);
+    return noted;
+}
+
+Status ArchiveWriter::note_missing_targets(uint32_t camera, uint32_t first, uint32_t last, const std::string& why) {
+    State& state = *state_;
+    assert(!state.finished && !why.empty() && first <= last);
+    const MissingRun run{camera, first, last, why.substr(0, short_reason_bytes), {}};
+    state.missing.push_back(run);
+    const Status noted = state.journal.append_reserved(journal_line(run));
+    if (!noted) state.not_journaled.push_back(run);
+    return noted;
 }
 
 void ArchiveWriter::add_to_manifest(const nlohmann::json& extra) {
@@ -186,18 +220,25 @@ void ArchiveWriter::add_to_manifest(const nlohmann::json& extra) {
 Status ArchiveWriter::finish() {
     State& state = *state_;
     assert(!state.finished);
-    nlohmann::json manifest = manifest_of(state.info);
-    const size_t written = state.noted.size() - state.missing.size();
-    manifest["targets"] = {{"written", written}, {"missing", state.missing}};
+    for (const MissingRun& run : state.not_journaled)
+        if (auto s = state.journal.append_reserved(journal_line(run)); !s) return s;
+    state.not_journaled.clear();
+    nlohmann::json manifest = manifest_of(state.info), missing = nlohmann::json::array();
+    uint64_t missing_count = 0;
+    for (const MissingRun& run : state.missing) {
+        missing.push_back(run.line());
+        missing_count += uint64_t(run.last) - run.first + 1;
+    }
+    manifest["targets"] = {{"written", state.written.size()}, {"missing", missing}};
     const std::string text = text_of(manifest);
-    if (auto s = write_file_durably((state.root / manifest_name).string(), text); !s) return s;
+    if (auto s = state.manifest.write((state.place.folder() / manifest_name).string(), text); !s) return s;
     const nlohmann::json line = {{"event", "end"},
-                                 {"written", written},
-                                 {"missing", state.missing.size()},
+                                 {"written", state.written.size()},
+                                 {"missing", missing_count},
                                  {"manifest", to_json(checksum_text(text))}};
-    if (auto s = state.journal.append(line); !s) return s;
+    if (auto s = state.journal.append_reserved(line); !s) return s;
     state.finished = true;
-    return Done{};
+    return take_place();
 }
 
 }  // namespace ols

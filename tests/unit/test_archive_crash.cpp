@@ -128,20 +128,26 @@ TEST_F(ArchiveCrash, a_full_disk_names_itself_and_the_writer_goes_on_when_there_
     EXPECT_EQ(reader->read_target(0, 1)->lamps, numbered_target(4, 300, 300, Cfa::rggb, 1).lamps);
 }
 
-TEST_F(ArchiveCrash, a_journal_line_that_does_not_fit_is_taken_back) {
+TEST_F(ArchiveCrash, a_journal_line_that_does_not_fit_is_taken_back_and_made_up_for_in_short_or_at_the_end) {
     const auto child = [&]() -> int {
         auto writer = ArchiveWriter::create(path, take_info(1));
         if (!writer->write_target(numbered_target(1, 8, 8, Cfa::none, 0))) return 1;
         limit_file_size(8000);
-        const auto noted = writer->note_missing_target(0, 1, std::string(20000, 'x'));
-        if (noted.ok() || noted.error().message.find("journal.jsonl") == std::string::npos) return 2;
-        return writer->note_missing_target(0, 1, "a short reason").ok() && writer->finish().ok() ? 0 : 3;
+        if (!writer->note_missing_target(0, 1, std::string(20000, 'x'))) return 2;
+        // Now not even that fits.
+        limit_file_size(std::filesystem::file_size(path + "/journal.jsonl") + 20);
+        const auto noted = writer->note_missing_target(0, 2, "a short reason");
+        if (noted.ok() || noted.error().message.find("journal.jsonl") == std::string::npos) return 3;
+        limit_file_size(RLIM_INFINITY);
+        return writer->finish().ok() ? 0 : 4;
     };
     ASSERT_EQ(exit_status(in_child(child)), 0);
     const auto reader = ArchiveReader::open(path);
     EXPECT_EQ(joined(reader->verify().problems), "");
-    ASSERT_EQ(reader->targets().size(), 2u);
-    EXPECT_EQ(reader->targets()[1].why_missing, "a short reason");
+    ASSERT_EQ(reader->targets().size(), 3u);
+    EXPECT_EQ(reader->targets()[1].why_missing, std::string(160, 'x'));
+    EXPECT_EQ(reader->targets()[2].why_missing, "a short reason");
+    EXPECT_EQ(reader->manifest()["targets"]["missing"][0]["why"], std::string(20000, 'x'));
 }
 
 TEST_F(ArchiveCrash, an_archive_that_cannot_be_begun_leaves_no_directory) {

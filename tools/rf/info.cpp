@@ -17,6 +17,7 @@ constexpr const char* cfa_words[] = {"monochrome", "RGGB mosaic", "BGGR mosaic",
 
 json target_report(const ArchiveReader& archive, const TargetEntry& entry) {
     json report = {{"camera", entry.camera}, {"index", entry.index}};
+    if (entry.last > entry.index) report["through"] = entry.last;
     if (entry.file.empty()) {
         report["missing"] = entry.why_missing;
         return report;
@@ -45,11 +46,17 @@ json archive_report(const ArchiveReader& archive, const std::string& path) {
     report["lamps"] = archive.info().lights.size();
     report["targets"] = json::array();
     for (const auto& entry : archive.targets()) report["targets"].push_back(target_report(archive, entry));
+    for (TargetEntry run : archive.undecided()) {
+        run.why_missing = "never finished: the recording was interrupted";
+        report["targets"].push_back(target_report(archive, run));
+    }
     return report;
 }
 
 std::string target_line(const json& target) {
-    const auto name = fmt::format("camera {} target {}", target["camera"].get<int>(), target["index"].get<int>());
+    TargetEntry entry;
+    entry.index = target["index"], entry.last = target.value("through", entry.index);
+    const auto name = fmt::format("camera {} {}", target["camera"].get<int>(), target_words(entry));
     if (target.contains("missing")) return name + ": missing: " + target["missing"].get<std::string>();
     if (target.contains("damaged")) return name + ": damaged: " + target["damaged"].get<std::string>();
     auto line = fmt::format("{}: {} x {}, {}, {:.1f} MB", name, target["width"].get<int>(), target["height"].get<int>(),

@@ -11,15 +11,29 @@ namespace ols {
 
 namespace {
 
-nlohmann::json report_of(const ArchiveReader& archive, const Verification& found) {
+// Runs of missing targets; `through` is the last of a run of several.
+nlohmann::json missing_json(const ArchiveReader& archive) {
     nlohmann::json missing = nlohmann::json::array();
+    for (const auto& entry : archive.targets()) {
+        if (!entry.file.empty()) continue;
+        missing.push_back({{"camera", entry.camera}, {"index", entry.index}, {"why", entry.why_missing}});
+        if (entry.last > entry.index) missing.back()["through"] = entry.last;
+    }
+    return missing;
+}
+
+uint64_t count_missing(const ArchiveReader& archive) {
+    uint64_t count = 0;
     for (const auto& entry : archive.targets())
-        if (entry.file.empty())
-            missing.push_back({{"camera", entry.camera}, {"index", entry.index}, {"why", entry.why_missing}});
+        if (entry.file.empty()) count += uint64_t(entry.last) - entry.index + 1;
+    return count;
+}
+
+nlohmann::json report_of(const ArchiveReader& archive, const Verification& found) {
     return {{"finished", archive.finished()},
             {"ok", found.problems.empty()},
             {"intact", found.intact},
-            {"missing", missing},
+            {"missing", missing_json(archive)},
             {"problems", found.problems}};
 }
 
@@ -35,9 +49,10 @@ Result<size_t> run(const std::string& path, bool as_json) {
     for (const auto& file : found.intact) fmt::print("ok       {}\n", file);
     for (const auto& entry : archive->targets())
         if (entry.file.empty())
-            fmt::print("missing  camera {} target {}: {}\n", entry.camera, entry.index, entry.why_missing);
+            fmt::print("missing  camera {} {}: {}\n", entry.camera, target_words(entry), entry.why_missing);
     for (const auto& problem : found.problems) fmt::print("problem  {}\n", problem);
-    fmt::print("{}: {} targets intact, {} problems\n", path, found.intact.size(), found.problems.size());
+    fmt::print("{}: {} targets intact, {} missing, {} problems\n", path, found.intact.size(), count_missing(*archive),
+               found.problems.size());
     return found.problems.size();
 }
 

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// Making an archive beside its name, and swapping it in.
+#include "archive/archive_place.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "archive/disk.hpp"
+#include "archive/journal.hpp"
+#include "archive/manifest.hpp"
+#include "archive/target_file.hpp"
+
+namespace ols {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Opens a folder for flock; -1 with errno.
+int open_folder(const fs::path& folder) {
+    return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+}
+
+// Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive.
+bool belongs_to_archive(std::string relative) {
+    if (relative.ends_with(unfinished_suffix)) relative.resize(relative.size() - std::strlen(unfinished_suffix));
+    unsigned camera = 0, index = 0;
+    const int numbers = std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index);
+    if (numbers == 2) return relative == target_file_name(camera, index);
+    if (numbers == 1) return relative == fmt::format("cam{}", camera);
+    return relative == manifest_name || relative == lights_name || relative == journal_name;
+}
+
+Status check_for_strangers(const fs::path& folder) {
+    std::error_code error;
+    for (const auto& entry : fs::recursive_directory_iterator(folder, error))
+        if (!belongs_to_archive(entry.path().lexically_relative(folder).generic_string()))
+            return fail("'" + entry.path().string() + "' is not part of an archive: move it before overwriting '" +
+                        folder.string() + "'");
+    if (error) return fail("cannot look into '" + folder.string() + "': " + error.message());
+    return Done{};
+}
+
+bool holds_targets(const fs::path& folder) {
+    std::error_code error;
+    for (const auto& entry : fs::recursive_directory_iterator(folder, error))
+        if (entry.path().extension() == ".exr") return true;
+    return false;
+}
+
+Status remove_folder(const fs::path& folder) {
+    std::error_code error;
+    fs::remove_all(folder, error);
+    if (error) return fail("cannot remove '" + folder.string() + "': " + error.message());
+    return Done{};
+}
+
+}  // namespace
+
+FolderLock::FolderLock(FolderLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+FolderLock& FolderLock::operator=(FolderLock&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+}
+FolderLock::~FolderLock() {
+    if (fd_ >= 0) ::close(fd_);
+}
+
+Result<FolderLock> FolderLock::take(const fs::path& folder) {
+    FolderLock lock;
+    lock.fd_ = open_folder(folder);
+    if (lock.fd_ < 0) return disk_error("open", folder.string(), errno);
+    if (flock(lock.fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        return fail("'" + folder.string() +
+                    "' is being recorded by another program: wait until it ends, or choose another name");
+    return lock;
+}
+
+bool is_being_written(const fs::path& folder) {
+    const int fd = open_folder(folder);
+    if (fd < 0) return false;
+    const bool is_held = flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    ::close(fd);
+    return is_held;
+}
+
+ArchivePlace::ArchivePlace(ArchivePlace&& other) noexcept
+    : root_(std::move(other.root_)),
+      folder_(std::move(other.folder_)),
+      lock_(std::move(other.lock_)),
+      replaced_lock_(std::move(other.replaced_lock_)),
+      replaces_(other.replaces_),
+      is_ours_(std::exchange(other.is_ours_, false)),
+      was_placed_(other.was_placed_) {}
+
+ArchivePlace::~ArchivePlace() {
+    std::error_code ignored;
+    if (is_ours_) fs::remove_all(folder_, ignored);
+}
+
+Result<ArchivePlace> ArchivePlace::make_beside(const fs::path& path, bool overwrite) {
+    ArchivePlace place;
+    place.root_ = path.lexically_normal();
+    if (!place.root_.has_filename()) place.root_ = place.root_.parent_path();  // "take.rfa/"
+    place.folder_ = place.root_.parent_path() / ("." + place.root_.filename().string() + ".recording");
+    std::error_code error;
+    place.replaces_ = fs::exists(fs::symlink_status(place.root_, error));
+    if (place.replaces_ && !overwrite)
+        return fail("'" + place.root_.string() + "' exists: choose another name or overwrite it");
+    if (place.replaces_)
+        if (const auto held = place.hold_what_is_replaced(); !held) return held.error();
+    if (const auto made = place.make_folder(); !made) return made.error();
+    return place;
+}
+
+Status ArchivePlace::hold_what_is_replaced() {
+    std::error_code error;
+    if (fs::is_symlink(root_, error))
+        return fail("'" + root_.string() + "' is a symbolic link: give the archive's own name to overwrite it");
+    if (!fs::exists(root_ / journal_name, error))
+        return fail("'" + root_.string() + "' exists and is not an archive: remove it yourself or choose another name");
+    auto lock = FolderLock::take(root_);
+    if (!lock) return lock.error();
+    replaced_lock_ = std::move(*lock);
+    return check_for_strangers(root_);
+}
+
+Status ArchivePlace::make_folder() {
+    std::error_code error;
+    const bool is_left = !fs::create_directory(folder_, error) && !error;
+    if (error)
+        return fail("cannot make '" + root_.string() + "': " + error.message() +
+                    "; the folder it lies in must exist and be writable");
+    auto lock = FolderLock::take(folder_);
+    if (!lock) return lock.error();
+    if (is_left) {
+        if (holds_targets(folder_) && !replaces_)
+            return fail("'" + folder_.string() + "' holds targets that an interrupted swap left: name it '" +
+                        root_.string() + "' to keep them, or remove it");
+        if (const auto checked = check_for_strangers(folder_); !checked) return checked;
+        for (const auto& entry : fs::directory_iterator(folder_, error)) fs::remove_all(entry.path(), error);
+        if (error) return fail("cannot empty '" + folder_.string() + "': " + error.message());
+    }
+    lock_ = std::move(*lock);
+    is_ours_ = true;
+    return Done{};
+}
+
+Status ArchivePlace::take() {
+    if (was_placed_) return Done{};
+    is_ours_ = false;
+    const auto rename_as = [&](unsigned flags) {
+        return renameat2(AT_FDCWD, folder_.c_str(), AT_FDCWD, root_.c_str(), flags) == 0;
+    };
+    const fs::path beside = folder_;
+    if (replaces_ && !rename_as(RENAME_EXCHANGE)) {
+        // Not every file system can exchange: the old one goes aside first. A crash in between leaves both.
+        const fs::path aside = root_.string() + ".replaced";
+        if (rename(root_.c_str(), aside.c_str()) != 0) return disk_error("put aside", root_.string(), errno);
+        if (!rename_as(0)) return disk_error("rename a recording to", root_.string(), errno);
+        folder_ = root_, was_placed_ = true;
+        if (auto synced = sync_directory(root_.parent_path().string()); !synced) return synced;
+        return remove_folder(aside);
+    }
+    if (!replaces_ && !rename_as(RENAME_NOREPLACE)) {
+        const bool can_not = errno == EINVAL || errno == ENOSYS;
+        if (!can_not || !rename_as(0))  // a plain rename replaces nothing but an empty folder
+            return disk_error("rename '" + beside.string() + "', where the recording stays, to", root_.string(), errno);
+    }
+    folder_ = root_, was_placed_ = true;
+    if (auto synced = sync_directory(root_.parent_path().string()); !synced) return synced;
+    return replaces_ ? remove_folder(beside) : Status(Done{});
+}
+
+}  // namespace ols
