@@ -35,8 +35,8 @@ Result<Calibration> open_calibration(const Options& options, const StageConfig& 
     return read_calibration(folder, stage);
 }
 
-TakeInfo describe_take(const Options& options, const Sequence& sequence, const StageConfig& stage,
-                       const TakeTargets& targets) {
+TakeInfo take_info(const Options& options, const Sequence& sequence, const StageConfig& stage,
+                   const TakeTargets& targets) {
     TakeInfo info = options.slate;
     info.frame_rate_hz = targets.every > 0 ? tracking_rate_hz(sequence) / targets.every
                                            : double(tick_hz) / double(sequence.cycle_ticks());
@@ -77,7 +77,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
               {"write", report.seconds_write}}}};
 }
 
-void print_report(const TakeReport& report, bool is_estimate, const Options& options) {
+void print_report(const TakeReport& report, bool is_estimate, const std::string& folder, const Options& options) {
     const RecordReport& record = report.record;
     if (!options.json)
         fmt::print("{}: {} targets written, {} missing; {} of {} slots missing; {:.1f} s\n", options.output,
@@ -110,7 +110,8 @@ void print_report(const TakeReport& report, bool is_estimate, const Options& opt
                    "stagectl: the basis has fewer independent rows than lamps: what was written is an estimate\n");
     if (record.slots_missing > 0)
         fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
-                   options.output);
+                   folder);
+    if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
 }
 
 // The account of identified frames, a JSON line each.
@@ -192,18 +193,19 @@ Result<int> run(const Options& options) {
     warn_of_long_cycles(*sequence, *targets);
     auto account = open_account(options.frames);
     if (!account.ok()) return account.error();
+    auto archive = ArchiveWriter::create_beside(options.output, take_info(options, *sequence, *stage, *targets),
+                                                options.overwrite);
+    if (!archive.ok()) return archive.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
-    auto archive =
-        ArchiveWriter::create(options.output, describe_take(options, *sequence, *stage, *targets), options.overwrite);
-    if (!archive.ok()) return archive.error();
 
-    const auto report = run_take(
-        *session->board, *session->camera, *sequence, *stage, *calibration, masks_of(options), *targets, *archive,
-        stop_on_signal(), [&](const Frame& frame) { add_to_account(*account, frame); },
-        [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); });
+    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options), *targets};
+    const auto report = run_take(take, {*session->board, {session->camera.get()}},
+                                 {*archive, [&](const Frame& frame) { add_to_account(*account, frame); },
+                                  [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }},
+                                 stop_on_signal());
     if (!report.ok()) return report.error();
-    print_report(*report, sequence->basis.is_estimate, options);
+    print_report(*report, sequence->basis.is_estimate, archive->folder(), options);
     if (options.json) fmt::print("{}\n", to_json(*report, options).dump(1));
     if (!report->write_error.empty()) return 1;
     return report->targets_missing > 0 || report->record.slots_missing > 0 ? 2 : 0;

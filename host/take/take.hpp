@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "archive/archive.hpp"
 #include "develop/develop.hpp"
@@ -13,19 +14,6 @@
 #include "stage/calibration.hpp"
 
 namespace ols {
-
-struct TakeReport {
-    RecordReport record;
-    int targets_written = 0, targets_missing = 0;
-    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, and not solved.
-    double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
-    // Where the time went: of the whole take, and busy in each thread.
-    double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
-    MotionDeveloper::Times seconds_motion;  // parts of seconds_develop, of a performance
-    // Share of a target's pixels where motion compensation failed, in the worst target.
-    double misaligned_share = 0;
-    std::string write_error;  // the first target that could not be written, and why; empty when all were
-};
 
 // What becomes of slots that were lost and samples that saturated.
 struct TakeMasks {
@@ -42,16 +30,51 @@ struct TakeTargets {
     MotionQuality quality = {};  // of a performance
 };
 
-// Threads: the camera's, the board's, the caller's, which identifies, one that develops, one that writes. Each hands on
-// one thing at a time, and developing runs on all processors; memory is bounded by frames_in_flight() frames and two
-// targets. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
-// `identified` sees every frame that has its slot, in the caller's thread. `info` gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
-// Errors: the board cannot be started. Anything later is in the report and in the archive.
-Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                            const Calibration& calibration, const TakeMasks& masks, const TakeTargets& targets,
-                            ArchiveWriter& archive, const std::atomic<bool>& stop,
-                            const std::function<void(const Frame&)>& identified,
-                            const std::function<void(uint64_t decided, uint64_t total)>& progress);
+// What is to be recorded, and what of it is to be made.
+struct TakeDescription {
+    Sequence sequence;
+    StageConfig stage;
+    Calibration calibration;  // of the stage's cameras, in their order
+    TakeMasks masks;
+    TakeTargets targets;
+};
+
+// What it is recorded with.
+struct TakeDevices {
+    Board& board;
+    std::vector<Camera*> cameras;  // the stage's, in their order
+};
+
+// Where it goes.
+struct TakeSinks {
+    // Its info gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
+    // It takes its place with the first frame that has its slot, so that a start that fails touches no earlier archive.
+    ArchiveWriter& archive;
+    std::function<void(const Frame&)> identified;                    // every frame that has its slot
+    std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
+};
+
+struct TakeReport {
+    RecordReport record;
+    int targets_written = 0, targets_missing = 0;
+    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, and not solved.
+    double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
+    // Where the time went: of the whole take, and busy in each thread.
+    double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
+    MotionDeveloper::Times seconds_motion;  // parts of seconds_develop, of a performance
+    // Share of a target's pixels where motion compensation failed, in the worst target.
+    double misaligned_share = 0;
+    std::string write_error;  // what could not be written first, and why; empty when all was
+};
+
+// Threads: the camera's, the board's, the caller's, which identifies and calls the sinks, one that develops, one that writes.
+// Each hands on one thing at a time, and developing runs on all processors; memory is bounded by frames_in_flight() frames and
+// two targets. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
+// Every target that was to come is in the archive's journal at the end, finished or missing with its reason.
+// Errors: as many cameras as the recorder takes (one) were not given; the board cannot be started; not one frame came. Then there
+// is no archive. Anything later is in the report and in the archive.
+Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
+                            const std::atomic<bool>& stop);
 
 // The mean black level of a calibration, for the optical code; nothing for a nominal one.
 std::optional<double> measured_black(const Calibration& calibration);

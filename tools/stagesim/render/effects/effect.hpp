@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // An effect is one part of the physics that is computed only when something calls for it (a shadow needs something that
 // casts it). One nobody calls for is not even made: it costs nothing and the picture has the same bits as with it
-// disabled. To add one: derive, and list it in effects.cpp.
+// disabled. To add one: derive, and list it in effect_set.cpp.
 #pragma once
 
 #include <array>

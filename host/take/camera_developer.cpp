@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+// Gathering frames into jobs, and developing those behind the recorder.
+#include "take/camera_developer.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "take/provenance.hpp"
+
+namespace ols {
+
+namespace {
+
+bool has_no_frame(const CycleFrames& frames) {
+    return std::ranges::none_of(frames.slots, [](const auto& frame) { return frame != nullptr; }) &&
+           std::ranges::all_of(frames.neighbours, [](const auto& of_slot) { return of_slot.empty(); });
+}
+bool has_no_frame(const TargetFrames& frames) {
+    return frames.frames.empty() && frames.tracking.empty() && frames.matte.empty();
+}
+
+// The pixels with a mask bit; raises `worst` to their share.
+int64_t count(MaskBit bit, const Target& target, double& worst) {
+    const auto& mask = target.mask;
+    const auto pixels = std::count_if(mask.begin(), mask.end(), [bit](uint32_t bits) { return (bits & bit) != 0; });
+    worst = std::max(worst, double(pixels) / double(mask.size()));
+    return pixels;
+}
+
+}  // namespace
+
+CameraDeveloper::CameraDeveloper(const TakeDescription& take, uint32_t camera, TargetWriter& writer)
+    : take_(take),
+      camera_(camera),
+      is_performance_(take.targets.every > 0),
+      writer_(writer),
+      developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
+                 {take.masks.estimate, take.stage.lamps}),
+      motion_developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
+                        {take.masks.estimate, take.stage.lamps}, take.targets.quality, std::max(take.targets.every, 1)),
+      plan_(plan_targets(take.sequence, take.masks, take.targets)),
+      store_(take.sequence),
+      missing_(take.sequence),
+      thread_([this] { develop(); }) {}
+
+void CameraDeveloper::add_frame(std::shared_ptr<const Frame> frame) {
+    if (next_ == plan_.size() || number_of(*frame, take_.sequence) < plan_[next_].frames.first) return;
+    const SlotKind kind = take_.sequence.slots[frame->slot].kind;
+    const bool is_kept = is_performance_ ? kind != SlotKind::dark : kind == SlotKind::basis;
+    if (is_kept) store_.add(std::move(frame));
+}
+
+void CameraDeveloper::add_missing(const MissingSlot& slot) {
+    missing_.add(slot);
+    why_missing_ = slot.why;
+}
+
+CameraDeveloper::Job CameraDeveloper::gather(size_t index) const {
+    const uint64_t target = plan_[index].target;
+    if (is_performance_) return {uint32_t(index), store_.around(uint32_t(index), target)};
+    return {uint32_t(index), store_.cycle(uint32_t(target), take_.masks.fill_from_neighbours)};
+}
+
+void CameraDeveloper::hand_on(uint64_t decided) {
+    for (; next_ < plan_.size() && plan_[next_].frames.last < decided; ++next_) {
+        Job job = gather(next_);
+        // What no later target needs is let go of before the camera may have to wait.
+        const bool is_last = next_ + 1 == plan_.size();
+        store_.forget_before(is_last ? take_.sequence.trigger_count() : plan_[next_ + 1].frames.first);
+        if (std::visit([](const auto& frames) { return has_no_frame(frames); }, job.frames)) {
+            lose(next_, next_);
+            continue;
+        }
+        flush_lost();
+        work_.push(std::move(job));
+    }
+}
+
+// A take that ends early may have lost millions of targets: they are noted in runs.
+void CameraDeveloper::lose(size_t first, size_t last) {
+    const std::string why = "no frame of it was recorded: " + (why_missing_.empty() ? "the take ended" : why_missing_);
+    if (lost_ && lost_->why != why) flush_lost();
+    if (!lost_) lost_ = LostTargets{camera_, uint32_t(first), uint32_t(last), why};
+    lost_->last = uint32_t(last);
+}
+
+void CameraDeveloper::flush_lost() {
+    if (lost_) work_.push(std::move(*lost_));
+    lost_.reset();
+}
+
+CameraDeveloper::Report CameraDeveloper::finish() {
+    if (!thread_.joinable()) return report_;
+    if (next_ < plan_.size()) lose(next_, plan_.size() - 1);
+    flush_lost();
+    work_.close();
+    thread_.join();
+    report_.seconds_motion = motion_developer_.times();
+    return report_;
+}
+
+void CameraDeveloper::develop() {
+    while (auto work = work_.pop()) {
+        if (auto* lost = std::get_if<LostTargets>(&*work)) {
+            writer_.add(std::move(*lost));
+            continue;
+        }
+        const auto start = std::chrono::steady_clock::now();
+        TargetOutcome outcome = develop(std::get<Job>(*work));
+        work.reset();  // its memory takes the camera's next frames
+        report_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        writer_.add(std::move(outcome));
+    }
+}
+
+TargetOutcome CameraDeveloper::develop(const Job& job) {
+    TargetOutcome outcome{camera_, job.index, nullptr, "", {}};
+    outcome.detail = std::visit([&](const auto& frames) { return provenance_of(frames, take_.sequence); }, job.frames);
+    auto target = std::visit([&](const auto& frames) { return develop(frames); }, job.frames);
+    if (!target.ok()) {
+        outcome.why = target.error().message;
+        return outcome;
+    }
+    outcome.target = std::make_unique<Target>(std::move(*target));
+    outcome.target->camera = camera_, outcome.target->index = job.index;
+    describe(*outcome.target, outcome.detail);
+    return outcome;
+}
+
+void CameraDeveloper::describe(Target& target, nlohmann::json& detail) {
+    if (target.provenance.is_object()) detail.update(target.provenance);
+    detail["saturated_pixels"] = count(mask_saturated, target, report_.saturated_share);
+    detail["estimated_pixels"] = count(mask_estimated, target, report_.estimated_share);
+    detail["unsolved_pixels"] = count(mask_unsolved, target, report_.unsolved_share);
+    if (!target.confidence.empty())
+        detail["misaligned_pixels"] = count(mask_misaligned, target, report_.misaligned_share);
+    target.provenance = detail;
+}
+
+}  // namespace ols

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// Camera developer: gathers the identified frames of one camera of a take and develops its targets, in a thread of its own.
+#pragma once
+
+#include <optional>
+#include <thread>
+#include <variant>
+
+#include "develop/frame_store.hpp"
+#include "record/event_queue.hpp"
+#include "record/missing_ranges.hpp"
+#include "take/take.hpp"
+#include "take/target_plan.hpp"
+#include "take/target_writer.hpp"
+
+namespace ols {
+
+class CameraDeveloper {
+  public:
+    struct Report {
+        // Shares of a target's pixels, in the worst target (TakeReport).
+        double saturated_share = 0, estimated_share = 0, unsolved_share = 0, misaligned_share = 0;
+        double seconds = 0;
+        MotionDeveloper::Times seconds_motion;
+    };
+
+    // `camera`: its place among the stage's. References must outlive the developer.
+    CameraDeveloper(const TakeDescription& take, uint32_t camera, TargetWriter& writer);
+    ~CameraDeveloper() { (void)finish(); }
+
+    size_t target_count() const { return plan_.size(); }
+
+    void add_frame(std::shared_ptr<const Frame> frame);
+    void add_missing(const MissingSlot& slot);
+
+    // Hands on the targets whose frames are all decided: those below `decided`.
+    void hand_on(uint64_t decided);
+
+    // Waits until everything handed on is with the writer, where the targets that were never decided go, too.
+    Report finish();
+    nlohmann::json missing_json() const { return missing_.to_json(); }
+
+  private:
+    // What one target is made of.
+    struct Job {
+        uint32_t index = 0;
+        std::variant<CycleFrames, TargetFrames> frames;
+    };
+
+    Job gather(size_t index) const;
+    void lose(size_t first, size_t last);
+    void flush_lost();
+    void develop();
+    TargetOutcome develop(const Job& job);
+    Result<Target> develop(const CycleFrames& frames) { return developer_.develop(frames); }
+    Result<Target> develop(const TargetFrames& frames) { return motion_developer_.develop(frames); }
+    void describe(Target& target, nlohmann::json& detail);
+
+    const TakeDescription& take_;
+    const uint32_t camera_;
+    const bool is_performance_;
+    TargetWriter& writer_;
+    Developer developer_;
+    MotionDeveloper motion_developer_;
+    const std::vector<PlannedTarget> plan_;
+    FrameStore store_;
+    MissingRanges missing_;
+    std::string why_missing_;          // the last missing slot's reason
+    size_t next_ = 0;                  // of the plan
+    std::optional<LostTargets> lost_;  // the run that the next target may belong to
+    Report report_;                    // the thread's until it has ended
+    EventQueue<std::variant<Job, LostTargets>> work_{1};
+    std::thread thread_;
+};
+
+}  // namespace ols

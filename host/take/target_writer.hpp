@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Target writer: the thread that writes what developing made into the archive, and notes what it could not make.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "archive/archive.hpp"
+#include "record/event_queue.hpp"
+
+namespace ols {
+
+// A target, or why there is none.
+struct TargetOutcome {
+    uint32_t camera = 0, index = 0;
+    std::unique_ptr<Target> target;
+    std::string why;
+    nlohmann::json detail;
+};
+
+// Targets of which no frame came, for one reason.
+struct LostTargets {
+    uint32_t camera = 0, first = 0, last = 0;
+    std::string why;
+};
+
+class TargetWriter {
+  public:
+    struct Report {
+        int written = 0, missing = 0;
+        double seconds = 0;
+        std::string error;  // what could not be written first, and why
+    };
+
+    explicit TargetWriter(ArchiveWriter& archive) : archive_(archive), thread_([this] { write(); }) {}
+    ~TargetWriter() { (void)finish(); }
+
+    // Each waits while the one before the last is written. Outcomes of one camera come in order.
+    void take_place() { work_.push(TakePlace{}); }
+    void add(TargetOutcome outcome) { work_.push(std::move(outcome)); }
+    void add(LostTargets run) { work_.push(std::move(run)); }
+
+    // Waits until all is written.
+    Report finish();
+
+  private:
+    struct TakePlace {};
+    using Work = std::variant<TakePlace, TargetOutcome, LostTargets>;
+
+    void write();
+    Status write(TakePlace) { return archive_.take_place(); }
+    Status write(const TargetOutcome& outcome);
+    Status write(const LostTargets& run);
+
+    ArchiveWriter& archive_;
+    Report report_;  // the thread's until it has ended
+    EventQueue<Work> work_{1};
+    std::thread thread_;
+};
+
+}  // namespace ols
