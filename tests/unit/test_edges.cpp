@@ -121,6 +121,9 @@ TEST_F(Edges, none_counts_before_start_nor_after_stop) {
     EXPECT_EQ(machine.calls, (std::vector<std::string>{"arm 1250", "start", "stop", "stop"}));
     start();
     expect(0, 0);
+    edges_arm(OLS_START_EACH_CYCLE_BY_EDGE, 1250);  // anew, without a stop
+    edges_count();
+    expect(0, 0);
 }
 
 }  // namespace

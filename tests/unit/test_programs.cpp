@@ -182,13 +182,19 @@ TEST_F(Programs, one_that_is_refused_is_gone) {
     expect_refused(OLS_ERROR_BAD_OFFSET, "not complete");
     EXPECT_EQ(programs_next_state(), OLS_NEXT_NONE);
 
-    ASSERT_TRUE(programs_load_begin(&begin, &error_));
     Bytes too_long = program;
     too_long.push_back(0);
-    EXPECT_FALSE(programs_load_chunk(0, too_long.data(), too_long.size(), &error_));
-    EXPECT_EQ(programs_next_state(), OLS_NEXT_NONE);
+    for (const size_t first_bytes : {size_t(0), size_t(700)}) {
+        ASSERT_TRUE(programs_load_begin(&begin, &error_));
+        ASSERT_TRUE(programs_load_chunk(0, too_long.data(), first_bytes, &error_));
+        EXPECT_FALSE(send(too_long, first_bytes, too_long.size()));
+        expect_refused(OLS_ERROR_BAD_OFFSET, "end with the program");
+        EXPECT_EQ(programs_next_state(), OLS_NEXT_NONE);
+    }
 
-    begin.program_bytes = 4 * SEQUENCE_WORDS_MAX + 1;
+    begin.program_bytes = 4 * SEQUENCE_WORDS_MAX;
+    EXPECT_TRUE(programs_load_begin(&begin, &error_)) << "as many bytes as there are";
+    begin.program_bytes++;
     EXPECT_FALSE(programs_load_begin(&begin, &error_));
     expect_refused(OLS_ERROR_BAD_PROGRAM, "too long");
     EXPECT_EQ(programs_next_state(), OLS_NEXT_NONE);
@@ -200,6 +206,7 @@ TEST_F(Programs, messages_at_the_wrong_time_are_refused_and_change_nothing) {
     const Bytes program = program_of(100);
     EXPECT_FALSE(send(program));
     expect_refused(OLS_ERROR_BAD_STATE, "begin with load begin");
+    error_ = {};
     EXPECT_EQ(make(), SEQUENCE_REFUSED);
     expect_refused(OLS_ERROR_BAD_STATE, "begin with load begin");
 
@@ -231,6 +238,17 @@ TEST_F(Programs, a_new_load_begin_ends_the_one_before_it_wherever_that_was) {
         EXPECT_TRUE(is(programs_next(), second)) << parts;
         EXPECT_TRUE(is_as_it_was_made(programs_next())) << parts;
     }
+}
+
+TEST_F(Programs, forgotten_both_are_gone) {
+    load(program_of(18));
+    programs_take_next();
+    load(program_of(12));
+    programs_forget();
+    EXPECT_EQ(programs_current()->header.slot_count, 0);
+    EXPECT_EQ(programs_next_state(), OLS_NEXT_NONE);
+    programs_take_next();
+    EXPECT_EQ(programs_current()->header.slot_count, 0);
 }
 
 TEST_F(Programs, only_those_fit_whose_cycles_begin_alike) {
