@@ -11,8 +11,8 @@
 #include "frame.h"
 #include "layout_hash.h"
 #include "pulse.h"
+#include "refusal.h"
 #include "stage.h"
-#include "text.h"
 #include "trigger_log.h"
 #include "usb.h"
 
@@ -180,11 +180,8 @@ static const struct command {
     {OLS_REBOOT_TO_BOOTLOADER, 0, 0, ANYBODYS, answer_reboot_to_bootloader},
 };
 
-static void refuse(struct reply* reply, enum ols_error_code code, const char* reason) {
-    reply->ok = false;
-    reply->payload.error = (struct ols_error_reply){.code = (uint16_t)code, .slot = OLS_NO_SLOT};
-    struct text text = text_in(reply->payload.error.text, sizeof reply->payload.error.text);
-    text_append(&text, reason);
+static void refuse_request(struct reply* reply, enum ols_error_code code, const char* reason) {
+    reply->ok = refuse(&reply->payload.error, code, reason);
 }
 
 static void answer(int n, const struct ols_frame* request, struct reply* reply) {
@@ -192,12 +189,14 @@ static void answer(int n, const struct ols_frame* request, struct reply* reply) 
         const struct command* const command = &commands[i];
         if (command->type != request->type) continue;
         if (request->payload_bytes < command->payload_bytes_min || request->payload_bytes > command->payload_bytes_max)
-            return refuse(reply, OLS_ERROR_BAD_LENGTH, "the message's length is wrong: host and board do not match");
+            return refuse_request(reply, OLS_ERROR_BAD_LENGTH,
+                                  "the message's length is wrong: host and board do not match");
         if (command->whose == OWNERS && n != owner && stage_is_armed())
-            return refuse(reply, OLS_ERROR_BAD_STATE, "another host has armed the board: stop first, or ask that host");
+            return refuse_request(reply, OLS_ERROR_BAD_STATE,
+                                  "another host has armed the board: stop first, or ask that host");
         return command->answer(request, reply);
     }
-    refuse(reply, OLS_ERROR_UNKNOWN_MESSAGE, "unknown message: update the firmware with `make flash`");
+    refuse_request(reply, OLS_ERROR_UNKNOWN_MESSAGE, "unknown message: update the firmware with `make flash`");
 }
 
 // True when the request has been answered.

@@ -27,6 +27,7 @@ struct sequence {
     uint16_t pattern_words;  // of one pattern
     uint32_t cycle_words;    // of the timeline, in one cycle; 0 until they are made
     uint32_t longest_light_ticks;
+    uint32_t words_crc32;  // of all words, once they are made (programs.c)
     // First header.program_bytes as they were loaded, slots and patterns; then the word that enters this program, in
     // place of the last one of the program before; then those of a cycle; then the word that waits for an edge.
     uint32_t words[SEQUENCE_WORDS_MAX];

@@ -1,58 +1,33 @@
 // SPDX-License-Identifier: MIT
-// Stage: the board's state, the loaded program, and what each command does.
+// Stage: the board's state, and what each command does in it.
 #include "stage.h"
-
-#include <string.h>
 
 #include "board.h"
 #include "cycle_digest.h"
+#include "edges.h"
 #include "fault.h"
-#include "frame.h"
+#include "heartbeat.h"
 #include "light_watch.h"
 #include "player.h"
-#include "receptor.h"
+#include "program_check.h"
+#include "programs.h"
+#include "refusal.h"
 #include "schedule.h"
-#include "sequence.h"
 #include "stop.h"
-#include "text.h"
 #include "trigger_log.h"
 #include "witness.h"
 
-enum { CHECKED_BYTES_A_TURN = 4096, RECHECKED_BYTES_A_TURN = 256 };
 enum { STAMPS_A_LOOK = 16 };  // the log takes 8 us for a trigger, so that a hundred of them keep the player waiting
 
 static enum ols_state state;
-static struct sequence sequences[2];
-static struct sequence* current = &sequences[0];  // what is played, or would be
-static struct sequence* spare = &sequences[1];    // where the next program is loaded
-static enum ols_next next;                        // what is in the spare one
-static struct ols_load_begin announced;           // of the program that is being loaded
-static uint32_t loaded_bytes;
-static uint32_t loaded_crc32;  // kept up chunk by chunk
-static struct sequence_compiler compiler;
-static bool compiling;
-static uint32_t sequence_crc32[2];  // of all words of each sequence, once it is made
-struct check {                      // of a sequence's words, turn by turn
-    uint32_t bytes, crc32;
-};
-static struct check checked;    // for a request
-static struct check rechecked;  // of the playing sequence, again and again
-static uint64_t start_us;
-static uint32_t stamps_read;
-static uint32_t cycles_of_done;  // of the program that has played to its end
-static enum ols_start_source started_by;
-static uint32_t edges_seen, edges_missed;  // since start, where each cycle waits for one
-static uint32_t heartbeat_us;              // 0: the host may be silent
-static uint8_t programs_swapped;           // since start
-static bool leaving;                       // for the boot loader
-
-static bool refuse(struct ols_error_reply* error, enum ols_error_code code, const char* reason) {
-    error->code = (uint16_t)code;
-    error->slot = OLS_NO_SLOT;
-    struct text text = text_in(error->text, sizeof error->text);
-    text_append(&text, reason);
-    return false;
-}
+static struct play {
+    uint64_t start_us;
+    enum ols_start_source started_by;
+    uint32_t stamps_read;
+    uint32_t cycles_of_done;   // of the program that has played to its end
+    uint8_t programs_swapped;  // into it
+} play;                        // since arm
+static bool leaving;           // for the boot loader
 
 static bool refuse_fault(struct ols_error_reply* error) {
     return refuse(error, OLS_ERROR_FAULT_LATCHED, "a fault is latched: read the status, then clear the fault");
@@ -63,97 +38,47 @@ static bool refuse_state(struct ols_error_reply* error, const char* reason) {
 }
 
 static uint64_t ticks_since_start(void) {
-    return (board_time_us() - start_us) * BOARD_TICKS_PER_US;
-}
-
-static uint32_t sequence_bytes(const struct sequence* sequence) {
-    return sequence->header.program_bytes + 4 * (2 + sequence->cycle_words);
-}
-
-// Goes on with the CRC of a sequence's words; true when complete. All at once takes half of the watchdog's time.
-static bool check_words(struct check* check, const struct sequence* sequence, uint32_t bytes_a_turn) {
-    const uint32_t left = sequence_bytes(sequence) - check->bytes;
-    const uint32_t now = left < bytes_a_turn ? left : bytes_a_turn;
-    check->crc32 = ols_crc32(check->crc32, (const uint8_t*)sequence->words + check->bytes, now);
-    check->bytes += now;
-    return now == left;
-}
-
-static bool words_are_good(const struct check* check, const struct sequence* sequence) {
-    return check->crc32 == sequence_crc32[sequence - sequences];
-}
-
-static void forget_next(void) {
-    next = OLS_NEXT_NONE;
-    compiling = false;
+    return (board_time_us() - play.start_us) * BOARD_TICKS_PER_US;
 }
 
 static void forget_programs(void) {
     state = OLS_STATE_IDLE;
-    current->header = (struct ols_load_begin){0};
-    forget_next();
-}
-
-// The spare program becomes the current one.
-static void take_next(void) {
-    rechecked = (struct check){0};
-    struct sequence* const before = current;
-    current = spare;
-    spare = before;
-    next = OLS_NEXT_NONE;
-}
-
-// Each edge begins a cycle, or came while one played and is missed. Reading takes longer than a cycle takes to begin after
-// its edge, so with as many cycles before as after, all of them are of the edges read in between.
-static void count_edges(void) {
-    if (started_by != OLS_START_EACH_CYCLE_BY_EDGE) return;
-    uint32_t cycles;
-    do {
-        cycles = player_cycles_begun();
-        edges_seen = receptor_edges();
-    } while (cycles != player_cycles_begun());
-    edges_missed = edges_seen - cycles;
-}
-
-// While it and the player still know what they counted.
-static void stop_receptor(void) {
-    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
-    receptor_stop();
+    programs_forget();
 }
 
 void stage_init(void) {
     leaving = false;
     stop_unguard();
     forget_programs();
-    trigger_log_begin(current, false);
+    trigger_log_begin(programs_current(), false);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;
 }
 
 // Reads the witness's stamps into the log. False when a trigger was not where it should be.
 static bool read_witness(void) {
     const uint32_t seen = witness_count();
-    cycle_digest_begin_turn(seen - stamps_read);
-    if (seen - stamps_read > WITNESS_RING_STAMPS) {
-        trigger_log_skip(seen - stamps_read - WITNESS_RING_STAMPS);
-        stamps_read = seen - WITNESS_RING_STAMPS;
+    cycle_digest_begin_turn(seen - play.stamps_read);
+    if (seen - play.stamps_read > WITNESS_RING_STAMPS) {
+        trigger_log_skip(seen - play.stamps_read - WITNESS_RING_STAMPS);
+        play.stamps_read = seen - WITNESS_RING_STAMPS;
     }
     const uint64_t now_ticks = ticks_since_start();
-    while (stamps_read != seen) {
-        if (stamps_read % STAMPS_A_LOOK == 0) player_poll();
-        if (!trigger_log_add(witness_stamp(stamps_read++), now_ticks)) return false;
+    while (play.stamps_read != seen) {
+        if (play.stamps_read % STAMPS_A_LOOK == 0) player_poll();
+        if (!trigger_log_add(witness_stamp(play.stamps_read++), now_ticks)) return false;
     }
     return true;
 }
 
 static void latch(struct stop stop) {
     const bool playing = state == OLS_STATE_PLAYING;
-    stop_receptor();
+    edges_stop();
     if (playing) read_witness();
     fault_latch(stop.cause, trigger_log_slot(),
-                playing && stop.us > start_us ? (stop.us - start_us) * BOARD_TICKS_PER_US : 0);
+                playing && stop.us > play.start_us ? (stop.us - play.start_us) * BOARD_TICKS_PER_US : 0);
     cycle_digest_end(false);
-    board_expect_message(0);
-    forget_next();
+    heartbeat_end();
+    programs_forget_next();
     state = OLS_STATE_FAULT;
 }
 
@@ -172,29 +97,22 @@ static bool end_play(enum ols_state ended) {
         return false;
     }
     board_dark();  // first of all
-    board_expect_message(0);
-    stop_receptor();
+    heartbeat_end();
+    edges_stop();
     player_stop();
     fault_note_idle();
-    if (next == OLS_NEXT_READY || next == OLS_NEXT_SWAPPING) take_next();
+    programs_take_next();
     state = ended;
     return true;
-}
-
-// Once more through the playing program's words, a part each turn: 94 KB take 376 turns.
-static bool words_stay_good(void) {
-    if (!check_words(&rechecked, current, RECHECKED_BYTES_A_TURN)) return true;
-    const bool good = words_are_good(&rechecked, current);
-    rechecked = (struct check){0};
-    return good;
 }
 
 // All of the old program has been played, and its triggers are in the log: its slots may be overwritten. From the next
 // light on the new program's limit holds.
 static void end_swap(void) {
-    take_next();
+    programs_take_next();
+    program_check_begin_play();
     schedule_settle();
-    light_watch_allow(current->longest_light_ticks);
+    light_watch_allow(programs_current()->longest_light_ticks);
 }
 
 static void follow_play(void) {
@@ -202,15 +120,16 @@ static void follow_play(void) {
     const uint32_t events = player_events();
     // Likewise: what has been entered was entered after the old program's last trigger.
     player_poll();
-    const bool swap_is_over = next == OLS_NEXT_SWAPPING && !player_swapping();
+    const bool is_swapping = programs_next_state() == OLS_NEXT_SWAPPING;
+    const bool swap_is_over = is_swapping && !player_swapping();
     const bool on_time = read_witness();
     if (events & PLAYER_TIMELINE_STARVED) return end_in_fault(OLS_FAULT_TIMELINE_STARVED);
     if (events & PLAYER_SHIFTER_STARVED) return end_in_fault(OLS_FAULT_SHIFTER_STARVED);
     if (!on_time) return end_in_fault(OLS_FAULT_SLIPPED);
-    if (!words_stay_good()) return end_in_fault(OLS_FAULT_BAD_MEMORY);
+    if (!program_check_turn_in_play(programs_current())) return end_in_fault(OLS_FAULT_BAD_MEMORY);
     if (events & PLAYER_DONE) {
-        if (next == OLS_NEXT_SWAPPING) take_next();
-        cycles_of_done = current->header.cycles;
+        if (is_swapping) programs_take_next();
+        play.cycles_of_done = programs_current()->header.cycles;
         end_play(OLS_STATE_DONE);
         cycle_digest_end(state == OLS_STATE_DONE);
         return;
@@ -237,7 +156,7 @@ void stage_fail(enum ols_fault cause) {
 }
 
 static void begin_play(void) {
-    start_us = board_time_us();
+    play.start_us = board_time_us();
     state = OLS_STATE_PLAYING;
 }
 
@@ -249,87 +168,54 @@ void stage_poll(bool host_is_there) {
         if (stop_seen() != OLS_FAULT_NONE) return end_in_fault(stop_seen());
     }
     if (state == OLS_STATE_WAITING) board_watch_genlock();  // before the look at what it does
-    if (state == OLS_STATE_WAITING || state == OLS_STATE_PLAYING) count_edges();
+    edges_count();
     // A cycle may be over, and the next one waited for, before this turn could see it play.
-    if (state == OLS_STATE_WAITING && (edges_seen > 0 || !player_waiting())) begin_play();
+    if (state == OLS_STATE_WAITING && (edges_seen() > 0 || !player_waiting())) begin_play();
     if (state == OLS_STATE_PLAYING) follow_play();
 }
 
 bool stage_load_begin(const struct ols_load_begin* begin, struct ols_error_reply* error) {
     if (state == OLS_STATE_ARMED || state == OLS_STATE_WAITING || state == OLS_STATE_FAULT)
         return refuse_state(error, "a program is armed: stop it, or start it, before loading another");
-    if (next == OLS_NEXT_SWAPPING)
-        return refuse_state(error, "a swap is under way: load when the status no longer says so");
-    if (state == OLS_STATE_PLAYING)
-        forget_next();
-    else
-        forget_programs();
-    if (begin->program_bytes > sizeof spare->words)
-        return refuse(error, OLS_ERROR_BAD_PROGRAM, "the program is too long for this board: send fewer slots");
-    announced = *begin;
-    next = OLS_NEXT_LOADING;
-    loaded_bytes = 0;
-    loaded_crc32 = 0;
-    return true;
+    if (state != OLS_STATE_PLAYING) forget_programs();
+    return programs_load_begin(begin, error);
 }
 
 bool stage_load_chunk(uint32_t offset_bytes, const uint8_t* data, size_t data_bytes, struct ols_error_reply* error) {
-    if (next != OLS_NEXT_LOADING || compiling)
-        return refuse_state(error, "no program is being loaded: begin with load begin");
-    if (offset_bytes != loaded_bytes || data_bytes > announced.program_bytes - loaded_bytes) {
-        forget_next();
-        return refuse(error, OLS_ERROR_BAD_OFFSET,
-                      "chunks must follow each other and end with the program: load again");
-    }
-    memcpy((uint8_t*)spare->words + loaded_bytes, data, data_bytes);
-    loaded_bytes += data_bytes;
-    loaded_crc32 = ols_crc32(loaded_crc32, data, data_bytes);
-    return true;
-}
-
-static bool program_has_arrived(struct ols_error_reply* error) {
-    if (loaded_bytes != announced.program_bytes)
-        return refuse(error, OLS_ERROR_BAD_OFFSET, "the program is not complete: load again");
-    if (loaded_crc32 != announced.program_crc32)
-        return refuse(error, OLS_ERROR_BAD_CRC, "the program arrived damaged (CRC): load again");
-    return true;
-}
-
-// One turn's part of making the sequence; then one turn's part of its CRC.
-static enum stage_answer make_sequence(struct ols_error_reply* error) {
-    if (!compiling) {
-        if (!program_has_arrived(error)) return STAGE_REFUSED;
-        spare->header = announced;
-        sequence_begin(&compiler, &board_sequence, spare);
-        compiling = true;
-    }
-    if (spare->cycle_words == 0)
-        return sequence_step(&compiler, error) == SEQUENCE_REFUSED ? STAGE_REFUSED : STAGE_BUSY;
-    if (checked.bytes == 0) checked = (struct check){loaded_bytes, loaded_crc32};  // which has its CRC already
-    if (!check_words(&checked, spare, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
-    sequence_crc32[spare - sequences] = checked.crc32;
-    return STAGE_OK;
+    return state == OLS_STATE_FAULT ? refuse_fault(error) : programs_load_chunk(offset_bytes, data, data_bytes, error);
 }
 
 enum stage_answer stage_load_end(struct ols_error_reply* error) {
-    if (next != OLS_NEXT_LOADING) {
-        refuse_state(error, "no program is being loaded: begin with load begin");
+    if (state == OLS_STATE_FAULT) {
+        refuse_fault(error);
         return STAGE_REFUSED;
     }
-    const enum stage_answer answer = make_sequence(error);
-    if (answer == STAGE_BUSY) return answer;
-    forget_next();
-    if (answer == STAGE_REFUSED) return answer;
-    next = OLS_NEXT_READY;
-    if (state == OLS_STATE_PLAYING) return answer;
-    take_next();
+    switch (programs_load_end(error)) {
+        case SEQUENCE_UNFINISHED: return STAGE_BUSY;
+        case SEQUENCE_REFUSED: return STAGE_REFUSED;
+        case SEQUENCE_MADE: break;
+    }
+    if (state == OLS_STATE_PLAYING) return STAGE_OK;
+    programs_take_next();
     state = OLS_STATE_LOADED;
-    return answer;
+    return STAGE_OK;
 }
 
 void stage_begin_request(bool from_owner) {
-    if (from_owner && stage_is_armed()) board_expect_message(heartbeat_us);
-    checked = (struct check){0};
+    if (from_owner) heartbeat_renew();
+    program_check_begin();
+}
+
+// A turn's part of reading a program's words once more. Damaged ones are a fault.
+static enum stage_answer check_program(const struct sequence* program, struct ols_error_reply* error) {
+    switch (program_check_turn(program)) {
+        case PROGRAM_UNDECIDED: return STAGE_BUSY;
+        case PROGRAM_GOOD: return STAGE_OK;
+        case PROGRAM_DAMAGED: break;
+    }
+    end_in_fault(OLS_FAULT_BAD_MEMORY);
+    refuse_fault(error);
+    return STAGE_REFUSED;
 }
 
 static bool arm_is_valid(const struct ols_arm* arm, struct ols_error_reply* error) {
@@ -362,35 +248,29 @@ enum stage_answer stage_arm(const struct ols_arm* arm, struct ols_error_reply* e
         return STAGE_REFUSED;
     }
     if (!arm_is_valid(arm, error)) return STAGE_REFUSED;
-    if (!check_words(&checked, current, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
-    if (!words_are_good(&checked, current)) {
-        end_in_fault(OLS_FAULT_BAD_MEMORY);
-        refuse_fault(error);
-        return STAGE_REFUSED;
-    }
+    const struct sequence* const current = programs_current();
+    const enum stage_answer checked = check_program(current, error);
+    if (checked != STAGE_OK) return checked;
     stop_guard();  // before the look at the inputs, so that no fall is between them
     if (!arm_is_safe(error)) {
         stop_unguard();
         return STAGE_REFUSED;
     }
-    started_by = arm->start_source;
-    const bool cycles_wait = started_by == OLS_START_EACH_CYCLE_BY_EDGE;
+    const enum ols_start_source start = arm->start_source;
+    const bool cycles_wait = start == OLS_START_EACH_CYCLE_BY_EDGE;
     trigger_log_begin(current, cycles_wait);
     schedule_begin(current, cycles_wait);
-    programs_swapped = 0;
-    stamps_read = 0;
-    edges_seen = edges_missed = 0;
-    witness_arm(started_by);
-    if (cycles_wait) receptor_arm(arm->debounce_ticks);
+    play = (struct play){.started_by = start};
+    witness_arm(start);
+    edges_arm(start, arm->debounce_ticks);
     light_watch_arm(current->longest_light_ticks);
-    rechecked = (struct check){0};
-    if (!player_arm(current, started_by)) {
+    program_check_begin_play();
+    if (!player_arm(current, start)) {
         end_in_fault(OLS_FAULT_SHIFTER_STARVED);
         refuse_fault(error);
         return STAGE_REFUSED;
     }
-    heartbeat_us = arm->heartbeat_ticks / BOARD_TICKS_PER_US;
-    board_expect_message(heartbeat_us);
+    heartbeat_begin(arm->heartbeat_ticks);
     state = OLS_STATE_ARMED;
     return STAGE_OK;
 }
@@ -400,8 +280,8 @@ bool stage_start(struct ols_error_reply* error) {
     begin_play();
     witness_start();
     player_start();
-    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) receptor_start();
-    if (started_by != OLS_START_BY_COMMAND) state = OLS_STATE_WAITING;
+    edges_start();
+    if (play.started_by != OLS_START_BY_COMMAND) state = OLS_STATE_WAITING;
     return true;
 }
 
@@ -415,41 +295,30 @@ bool stage_stop(struct ols_error_reply* error) {
     return true;
 }
 
-// Whether the next program can go on where this one leaves off: what the pins mean, and how a cycle begins, stays.
-static bool next_fits(struct ols_error_reply* error) {
-    bool fits = current->header.lead_ticks == spare->header.lead_ticks;
-    for (int n = 0; n < OLS_TRIGGERS; n++)
-        fits = fits && current->header.triggers[n].active_low == spare->header.triggers[n].active_low;
-    return fits || refuse(error, OLS_ERROR_BAD_PROGRAM,
-                          "lead_ticks and polarities of both programs must be the same to swap them");
-}
-
 enum stage_answer stage_swap(struct ols_swap_reply* reply, struct ols_error_reply* error) {
-    if (state != OLS_STATE_PLAYING || next != OLS_NEXT_READY) {
+    if (state != OLS_STATE_PLAYING || programs_next_state() != OLS_NEXT_READY) {
         refuse_state(error, "nothing to swap: load the next program while one is playing");
         return STAGE_REFUSED;
     }
-    if (started_by == OLS_START_EACH_CYCLE_BY_EDGE) {
+    if (play.started_by == OLS_START_EACH_CYCLE_BY_EDGE) {
         refuse_state(error, "cycles that wait for edges are not swapped: stop, and arm the next program");
         return STAGE_REFUSED;
     }
-    if (!check_words(&checked, spare, CHECKED_BYTES_A_TURN)) return STAGE_BUSY;
-    if (!words_are_good(&checked, spare)) {
-        end_in_fault(OLS_FAULT_BAD_MEMORY);
-        refuse_fault(error);
-        return STAGE_REFUSED;
-    }
-    if (!next_fits(error)) return STAGE_REFUSED;
+    const struct sequence* const next = programs_next();
+    const enum stage_answer checked = check_program(next, error);
+    if (checked != STAGE_OK) return checked;
+    if (!programs_fit(error)) return STAGE_REFUSED;
     uint32_t after_cycles;
-    if (spare->longest_light_ticks > current->longest_light_ticks) light_watch_allow(spare->longest_light_ticks);
-    if (!player_swap(spare, &after_cycles)) {
-        light_watch_allow(current->longest_light_ticks);
+    const uint32_t longest_light_ticks = programs_current()->longest_light_ticks;
+    if (next->longest_light_ticks > longest_light_ticks) light_watch_allow(next->longest_light_ticks);
+    if (!player_swap(next, &after_cycles)) {
+        light_watch_allow(longest_light_ticks);
         refuse(error, OLS_ERROR_BAD_STATE, "the playing program ends before a swap: arm and start the next one then");
         return STAGE_REFUSED;
     }
-    trigger_log_swap(spare, after_cycles);
-    next = OLS_NEXT_SWAPPING;
-    *reply = (struct ols_swap_reply){.after_cycles = after_cycles, .program = ++programs_swapped};
+    trigger_log_swap(next, after_cycles);
+    programs_swap();
+    *reply = (struct ols_swap_reply){.after_cycles = after_cycles, .program = ++play.programs_swapped};
     return STAGE_OK;
 }
 
@@ -470,7 +339,7 @@ bool stage_is_leaving(void) {
 }
 
 static uint32_t cycles_played(void) {
-    return state == OLS_STATE_DONE ? cycles_of_done : trigger_log_cycle();
+    return state == OLS_STATE_DONE ? play.cycles_of_done : trigger_log_cycle();
 }
 
 struct ols_canbus_state stage_summary(void) {
@@ -492,8 +361,8 @@ void stage_status(struct ols_status_reply* status) {
                                         .triggers_fired = trigger_log_fired(),
                                         .cycles_played = cycles_played(),
                                         .log_entries_lost = trigger_log_lost(),
-                                        .program_crc32 = current->header.program_crc32,
-                                        .next = (uint8_t)next,
-                                        .edges_seen = edges_seen,
-                                        .edges_missed = edges_missed};
+                                        .program_crc32 = programs_current()->header.program_crc32,
+                                        .next = (uint8_t)programs_next_state(),
+                                        .edges_seen = edges_seen(),
+                                        .edges_missed = edges_missed()};
 }

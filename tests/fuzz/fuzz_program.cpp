@@ -46,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const size_t slot_bytes = sizeof(ols_slot) + 4u * slot_pattern_words(board.chain_bits);
     if (header.cycles % 4) header.slot_count = uint16_t(std::min<size_t>(size / slot_bytes, 0xffff));
     header.program_bytes = uint32_t(header.cycles % 8 ? header.slot_count * slot_bytes : header.program_bytes);
-    if (header.program_bytes > size) return 0;  // stage.c never hands over less than it says
+    if (header.program_bytes > size) return 0;  // programs.c never hands over less than it says
 
     static const auto words = std::make_unique<sequence>();
     if (header.program_bytes > sizeof words->words) return 0;  // nor takes more than there is room for

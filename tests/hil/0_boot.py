@@ -11,7 +11,9 @@ import pytest
 
 import check_trace
 from ols_board import claims, wire
-from ols_board.board import BOARD, IMAGE, ROOT, EmulatedBoard
+from ols_board.board import BOARD, IMAGE, ROOT, EmulatedBoard, Link
+from ols_board.program import paper_program
+from ols_board.usb import Usb
 
 pytestmark = pytest.mark.skipif(BOARD != "emulated", reason="needs the emulated board: nobody sees a real one boot")
 
@@ -136,12 +138,34 @@ def test_without_a_crystal_the_board_starts_again_and_again_in_the_dark(emulated
     assert statistics["boot"]["driven_us"] is None
 
 
-def test_a_board_whose_parent_was_killed_ends_by_itself(tmp_path):
-    start = f"import subprocess; subprocess.Popen(['node', {str(ROOT / 'tools/stagesim/board/board.mjs')!r}, '--image', " \
-        f"{str(IMAGE)!r}, '--usb', {str(tmp_path / 'board.sock')!r}]); input()"
-    parent = subprocess.Popen([sys.executable, "-c", start], stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "board.sock").exists():
-        time.sleep(0.05)
-    parent.send_signal(signal.SIGKILL)
-    assert "whoever started this board has gone" in parent.stderr.read()  # which ends when the board has closed it
-    parent.wait()
+# Starts a board, takes its exposures, and dies as one that was killed: at once, or when told to.
+PARENT = """
+import os, signal, socket, subprocess, sys
+listener = socket.socket(socket.AF_UNIX)
+listener.bind("stage.sock")
+listener.listen(1)
+command = ["node", sys.argv[1], "--image", sys.argv[2], "--usb", "board.sock", "--exposures", "stage.sock"]
+print(subprocess.Popen(command).pid, flush=True)
+stage, _ = listener.accept()
+if sys.argv[3] == "later":
+    sys.stdin.readline()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("when", ["at once", "later"])
+def test_a_board_whose_parent_was_killed_ends_by_itself_also_while_it_starts_and_while_it_plays(when, tmp_path):
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, ROOT / "tools/stagesim/board/board.mjs", IMAGE, when], cwd=tmp_path,
+                              stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    board = int(parent.stdout.readline())
+    try:
+        if when == "later":
+            while not (tmp_path / "board.sock").exists():
+                time.sleep(0.05)
+            link = Link(Usb(tmp_path / "board.sock"))
+            link.play(paper_program(cycles=0))  # whose exposures nobody reads: it is held back
+        _, log = parent.communicate("\n", timeout=60)  # ends when the board, too, has closed its stderr
+        assert "whoever started this board has gone" in log
+    except subprocess.TimeoutExpired:
+        os.kill(board, signal.SIGKILL)
+        raise

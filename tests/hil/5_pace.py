@@ -71,8 +71,9 @@ def test_in_wall_pace_the_board_is_not_faster_than_the_clock_and_counts_what_nob
     status = link.wait_until([wire.DONE, wire.FAULT])
     wall_s = time.monotonic() - begin
     assert status["fault"] == 0
-    # The board may catch up with 5 ms of the clock, and no more, however busy this machine is.
-    assert wall_s >= 4 * slots * PERIOD_TICKS * 8e-9 - 0.005
+    # The board may catch up with 5 ms of the clock, and no more, however busy this machine is; and it looks at the clock after
+    # each slice of 1 ms, with a timer that may ring 1 ms early.
+    assert wall_s >= 4 * slots * PERIOD_TICKS * 8e-9 - 0.007
     assert board.stop()["dropped"] > 0  # the stream was never read
 
 

@@ -24,8 +24,8 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/mutation"
 EQUIVALENT = ROOT / "tests/mutation/equivalent.txt"
-MUTATED = ["firmware/sequence.c", "protocol/frame.c", "firmware/fault.c", "firmware/healthy.c"]
-TESTS = ["frame", "fault", "wire", "link", "stops", "healthy", "schedule", "trigger_log", "sequence_limits", "grey", "events", "sequence"]  # quick first
+MUTATED = ["firmware/sequence.c", "protocol/frame.c", "firmware/fault.c", "firmware/healthy.c", "firmware/programs.c", "firmware/program_check.c", "firmware/edges.c"]
+TESTS = ["frame", "fault", "program_check", "programs", "edges", "wire", "link", "stops", "healthy", "schedule", "trigger_log", "sequence_limits", "grey", "events", "sequence"]  # quick first
 COMPILE = ["-O1", "-g0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I.", "-Iprotocol", "-Ifirmware", "-Ihost", "-Itools", "-Itests/unit", f"-I{BUILD}"]
 
 TOKEN = re.compile(r"""(?P<skip>//[^\n]*|/\*.*?\*/|^[ \t]*\#[^\n]*|_Static_assert[^;]*;|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')

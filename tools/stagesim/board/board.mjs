@@ -19,6 +19,7 @@ const EXIT_VIOLATION = 3;
 const PARENT_MS = 500;
 
 async function main() {
+  const parent = process.ppid; // before anything is awaited: it may be killed while this starts
   const options = parseOptions(process.argv.slice(2));
   if (options.help) {
     process.stdout.write(USAGE);
@@ -72,14 +73,14 @@ async function main() {
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });
   for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => pacer.stop());
-  whenOrphaned(() => {
+  whenOrphaned(parent, () => {
     log('whoever started this board has gone: ending');
     pacer.stop();
   });
   await pacer.run();
 
-  const { wall_late_us } = pacer.statistics;
-  if (wall_late_us > 0) log(`behind the wall clock by ${Math.round(wall_late_us / 1000)} ms in all: this machine is too busy`);
+  const wall_late_ms = Math.round(pacer.statistics.wall_late_us / 1000);
+  if (wall_late_ms > 0) log(`behind the wall clock by ${wall_late_ms} ms in all: this machine is too busy`);
   usb?.close();
   can?.close();
   vcd?.close(board.tick);
@@ -92,9 +93,8 @@ async function main() {
   if (violations.list.length > 0) process.exitCode = EXIT_VIOLATION;
 }
 
-/** Calls once the process that started this one has ended, however it did. */
-function whenOrphaned(call) {
-  const parent = process.ppid;
+/** Calls once `parent`, the process that started this one, has ended, however it did. */
+function whenOrphaned(parent, call) {
   const look = setInterval(() => {
     if (process.ppid === parent) return;
     clearInterval(look);

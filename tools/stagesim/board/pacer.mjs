@@ -127,7 +127,7 @@ export class Pacer {
   async #followWall() {
     const board_ns = (this.#board.tick - this.#startTick) * 8;
     const wall_ns = Number(process.hrtime.bigint() - this.#startWall_ns);
-    if (board_ns > wall_ns) await sleep((board_ns - wall_ns) / 1e6);
+    if (board_ns > wall_ns) await sleep(Math.ceil((board_ns - wall_ns) / 1e6)); // a timer cuts fractions off
     else await new Promise(setImmediate);
     // A board that was kept from running is late, and stays so: it never goes faster than the clock to catch up.
     const late_ns = wall_ns - board_ns - CATCH_UP_NS;
