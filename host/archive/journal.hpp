@@ -18,10 +18,9 @@
 
 #include "archive/archive.hpp"
 #include "archive/disk.hpp"
+#include "image/whole_file.hpp"
 
 namespace ols {
-
-inline constexpr const char* journal_name = "journal.jsonl";
 
 nlohmann::json to_json(const Checksum& sum);
 std::optional<Checksum> checksum_from_json(const nlohmann::json& json);

@@ -6,10 +6,10 @@
 #include <string>
 
 #include "archive/archive.hpp"
+#include "image/whole_file.hpp"
 
 namespace ols {
 
-inline constexpr const char* manifest_name = "manifest.json";
 inline constexpr const char* lights_name = "lights.lp";
 inline constexpr const char* archive_format = "open-light-stage-archive";
 inline constexpr int archive_version = 1;

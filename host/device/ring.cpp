@@ -64,8 +64,8 @@ Result<RingWriter> RingWriter::create(const std::string& path, uint32_t slots, u
 
     // A reader never sees a half-made header.
     const Status made = write_whole_file(path, [&](const std::string& temporary) -> Status {
-        const int fd = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-        if (fd < 0) return fail("cannot make ring '" + path + "': " + std::strerror(errno));
+        const int fd = ::open(temporary.c_str(), O_RDWR | O_CLOEXEC);
+        if (fd < 0 || fchmod(fd, 0600) != 0) return fail("cannot make ring '" + path + "': " + std::strerror(errno));
         void* memory = MAP_FAILED;
         if (posix_fallocate(fd, 0, off_t(mapping->bytes)) == 0)
             memory = mmap(nullptr, mapping->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);

@@ -21,8 +21,8 @@ Result<Image> read_exr(const std::string& path);
 // Whether a file's `envmap` attribute says that it is a cube map. False without the attribute.
 Result<bool> is_exr_cube_map(const std::string& path);
 
-// Writes 1 (Y), 3 (R G B) or 4 (R G B A, premultiplied) channels, ZIP compressed, scene-linear, to a temporary
-// name and renames it, so that no half-written file stays. `attributes` are string attributes of the header; a
+// Writes 1 (Y), 3 (R G B) or 4 (R G B A, premultiplied) channels, ZIP compressed, scene-linear, as a whole file
+// (image/whole_file.hpp). `attributes` are string attributes of the header; a
 // colorInteropID of lin_rec709_scene brings the chromaticities with it.
 Status write_exr(const std::string& path, const Image& image, ExrType type = ExrType::half_float,
                  const std::map<std::string, std::string>& attributes = {});

@@ -11,7 +11,7 @@
 
 namespace ols {
 
-// Writes interleaved R G B, rows top to bottom, to a temporary name and renames it, so that no half-written file stays.
+// Writes interleaved R G B, rows top to bottom, as a whole file (image/whole_file.hpp).
 Status write_png(const std::string& path, int width, int height, std::span<const uint8_t> rgb8);
 
 // Writes a scene-linear image through tone_mapped_rgb8 (image/tone.hpp).

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "image/outputs.hpp"
+#include "program.hpp"
 #include "stage/basis_file.hpp"
 #include "stage/camera_presets.hpp"
 #include "stage/design_search.hpp"
@@ -128,6 +130,8 @@ void print_table(const std::vector<Compared>& all, const Design& design) {
 }
 
 Result<int> run(const Options& options) {
+    const Status writable = check_outputs({.inputs = {options.stage, options.camera}, .files = {options.output}});
+    if (!writable.ok()) return writable.error();
     const auto stage = options.stage.empty() ? Result<StageConfig>(default_stage()) : read_stage(options.stage);
     if (!stage.ok()) return stage.error();
     const auto problem = pose(options, *stage);
@@ -146,7 +150,7 @@ Result<int> run(const Options& options) {
     auto json = to_json(all, *design, *problem, options);
     if (options.subject == "equal") json["bound_mean_variance"] = bound_of(options, *problem).mean_variance;
     if (options.json) {
-        fmt::print("{}\n", json.dump(1));
+        print_json(json);
         return 0;
     }
     print_table(all, *design);

@@ -9,6 +9,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include "image/whole_file.hpp"
+
 namespace ols {
 
 namespace {
@@ -129,11 +131,13 @@ int run_gnuplot(const std::string& script) {
 
 Status plot_basis(const std::string& path, const Sequence& sequence, const BasisFigures& figures,
                   const Flicker& flicker) {
-    switch (run_gnuplot(script_of(path, sequence, figures, flicker))) {
-        case 0: return Done{};
-        case 127: return fail("the plot is drawn by gnuplot, which is not installed: apt install gnuplot-nox");
-        default: return fail("gnuplot could not draw '" + path + "': check that the folder exists and has space");
-    }
+    return write_whole_file(path, [&](const std::string& temporary) -> Status {
+        switch (run_gnuplot(script_of(temporary, sequence, figures, flicker))) {
+            case 0: return Done{};
+            case 127: return fail("the plot is drawn by gnuplot, which is not installed: apt install gnuplot-nox");
+            default: return fail("gnuplot could not draw '" + path + "': its message is above");
+        }
+    });
 }
 
 }  // namespace ols

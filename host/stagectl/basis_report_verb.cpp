@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "image/outputs.hpp"
+#include "program.hpp"
 #include "stage/basis_figures.hpp"
 #include "stage/camera_presets.hpp"
 #include "stage/flicker.hpp"
@@ -171,6 +173,10 @@ void print_report(const Report& report, const GreyChart& chart) {
 }
 
 Result<int> run(const Options& options) {
+    const Status writable =
+        check_outputs({.inputs = {options.sequence.path, options.sequence.basis, options.stage, options.camera},
+                       .files = {options.plot}});
+    if (!writable.ok()) return writable.error();
     const auto report = make_report(options);
     if (!report.ok()) return report.error();
     if (!options.plot.empty())
@@ -178,7 +184,7 @@ Result<int> run(const Options& options) {
             !status.ok())
             return status.error();
     if (options.json)
-        fmt::print("{}\n", to_json(*report, options.chart).dump(1));
+        print_json(to_json(*report, options.chart));
     else
         print_report(*report, options.chart);
     return 0;

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "program.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 #include "take/card.hpp"
@@ -35,7 +36,7 @@ Result<int> run(const Options& options) {
                                      {"black_counts", card->black_mean},
                                      {"flat_counts_per_us", card->flat_mean},
                                      {"brightest_share", card->brightest}};
-        fmt::print("{}\n", json.dump(1));
+        print_json(json);
     } else {
         fmt::print(
             "{}: {} frames of card and of dark at {:.2f} us; black {:.2f} counts, flat {:.4f} counts a "

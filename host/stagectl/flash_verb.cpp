@@ -2,8 +2,11 @@
 // stagectl flash: writes a firmware image to a board.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "device/board_flash.hpp"
 #include "device/boot_drive.hpp"
+#include "program.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -13,7 +16,7 @@ namespace {
 
 struct Options {
     std::string image, board, drive;
-    bool force_board = false;
+    bool force_board = false, json = false;
 };
 
 Result<std::string> serial_of(const std::string& board) {
@@ -23,14 +26,22 @@ Result<std::string> serial_of(const std::string& board) {
     return fail("'" + board + "' cannot be flashed: a board is flashed by USB, --board usb:SERIAL");
 }
 
+nlohmann::json to_json(const ImageLabel& label) {
+    return {{"board", label.board}, {"firmware", label.version}};
+}
+
 Result<int> flash_drive(const Options& options, const FirmwareImage& image) {
     if (!options.force_board)
         return fail(fmt::format("a drive cannot say whether its board is a '{}': if you are sure, add --force-board",
                                 image.label.board));
     const Status written = write_boot_drive(options.drive, image.uf2);
     if (!written.ok()) return written.error();
-    fmt::print("wrote {} {} to the drive; the board restarts by itself: check it with stagectl status --board usb:\n",
-               image.label.board, image.label.version);
+    if (options.json)
+        print_json({{"drive", options.drive}, {"image", to_json(image.label)}});
+    else
+        fmt::print(
+            "wrote {} {} to the drive; the board restarts by itself: check it with stagectl status --board usb:\n",
+            image.label.board, image.label.version);
     return 0;
 }
 
@@ -49,7 +60,10 @@ Result<int> run(const Options& options) {
     const auto report =
         flash_board(**bus, *image, request, [](size_t done, size_t total) { show_progress("flashing", done, total); });
     if (!report.ok()) return report.error();
-    fmt::print("board usb:{} runs {} {}\n", report->serial, report->label.board, report->label.version);
+    if (options.json)
+        print_json({{"board", "usb:" + report->serial}, {"image", to_json(report->label)}});
+    else
+        fmt::print("board usb:{} runs {} {}\n", report->serial, report->label.board, report->label.version);
     return 0;
 }
 
@@ -70,6 +84,7 @@ void add_flash_verb(CLI::App& app, int& exit_code) {
                      "copy to the BOOTSEL drive mounted there instead (needs --force-board)");
     verb->add_flag("--force-board", options->force_board,
                    "the board is in BOOTSEL mode, new or with foreign firmware: it is the one the image is for");
+    verb->add_flag("--json", options->json, "print as JSON what was written where");
     verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
 }
 

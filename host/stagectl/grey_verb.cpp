@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "program.hpp"
 #include "stage/sequence.hpp"
 #include "stage/stage.hpp"
 #include "stagectl/session.hpp"
@@ -55,13 +56,12 @@ Result<int> run(const Options& options) {
         auto levels = nlohmann::json::array();
         for (size_t level = 0; level < errors.size(); ++level)
             levels.push_back({{"level", level}, {"light_ticks", light[level]}, {"error_levels", errors[level]}});
-        fmt::print("{}\n", nlohmann::json{{"worst_error_levels", errors[worst]},
-                                          {"worst_level", worst},
-                                          {"least_unit_ticks", least},
-                                          {"span_us", us(grey_span_ticks(options.timing))},
-                                          {"span_us_with_least_unit", us(grey_span_ticks(with_least))},
-                                          {"levels", levels}}
-                               .dump(1));
+        print_json({{"worst_error_levels", errors[worst]},
+                    {"worst_level", worst},
+                    {"least_unit_ticks", least},
+                    {"span_us", us(grey_span_ticks(options.timing))},
+                    {"span_us_with_least_unit", us(grey_span_ticks(with_least))},
+                    {"levels", levels}});
         return 0;
     }
     fmt::print("lamp: on after {} us, 10 to 90 % in {} us; off after {} us, 90 to 10 % in {} us\n", lamp.on_delay_us,

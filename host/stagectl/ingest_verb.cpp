@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "program.hpp"
 #include "stagectl/verbs.hpp"
 
 namespace ols {
@@ -21,7 +22,7 @@ struct Options {
 };
 
 void show_progress(int done, int total) {
-    fmt::print(stderr, "\rreading pictures {}/{}{}", done, total, done == total ? "\n" : "");
+    std::fprintf(stderr, "\rreading pictures %d/%d%s", done, total, done == total ? "\n" : "");
 }
 
 Status run(Options& options) {
@@ -29,10 +30,12 @@ Status run(Options& options) {
     const auto report = ingest(options.ingest);
     if (!report) return report.error();
     if (options.json) {
-        const nlohmann::json json = {{"output", options.ingest.output}, {"lamps", report->lamps},
-                                     {"width", report->width},          {"height", report->height},
-                                     {"color", report->color},          {"unused", report->unused}};
-        fmt::print("{}\n", json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace));
+        print_json({{"output", options.ingest.output},
+                    {"lamps", report->lamps},
+                    {"width", report->width},
+                    {"height", report->height},
+                    {"color", report->color},
+                    {"unused", report->unused}});
         return Done{};
     }
     fmt::print("{}: {} lamps, {} x {}, {}\n", options.ingest.output, report->lamps, report->width, report->height,

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "program.hpp"
 #include "record/board_log.hpp"
 #include "record/recorder.hpp"
 #include "stagectl/sequence_options.hpp"
@@ -31,11 +32,11 @@ struct Account {
             unseen += entry.counter - (triggers + unseen);
             ++triggers;
             if (json)
-                fmt::print("{}\n", nlohmann::json{{"counter", uint32_t(entry.counter)},
-                                                  {"cycle", uint32_t(entry.cycle)},
-                                                  {"slot", uint16_t(entry.slot)},
-                                                  {"tick", uint64_t(entry.rise_ticks)}}
-                                       .dump());
+                print_json({{"counter", uint32_t(entry.counter)},
+                            {"cycle", uint32_t(entry.cycle)},
+                            {"slot", uint16_t(entry.slot)},
+                            {"tick", uint64_t(entry.rise_ticks)}},
+                           on_one_line);
         }
     }
 };

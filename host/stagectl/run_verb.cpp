@@ -2,9 +2,10 @@
 // stagectl run: plays a sequence and records the take.
 #include <fmt/format.h>
 
-#include <fstream>
-
 #include "develop/basis_record.hpp"
+#include "image/line_file.hpp"
+#include "image/outputs.hpp"
+#include "program.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -115,19 +116,20 @@ void print_report(const TakeReport& report, bool is_estimate, const std::string&
 }
 
 // The account of identified frames, a JSON line each.
-Result<std::ofstream> open_account(const std::string& path) {
-    std::ofstream file;
-    if (!path.empty()) file.open(path);
-    if (!path.empty() && !file) return fail("cannot write '" + path + "': check that its folder exists");
-    return file;
+Result<LineFile> open_account(const Options& options) {
+    const Status writable = check_outputs(
+        {.inputs = {options.sequence.path, options.sequence.basis, options.links.stage_path, options.calibration},
+         .streams = {options.frames}});
+    if (!writable.ok()) return writable.error();
+    LineFile account(options.frames);
+    if (const Status opened = account.status(); !opened.ok()) return opened.error();
+    return account;
 }
 
-void add_to_account(std::ofstream& account, const Frame& frame) {
-    if (!account.is_open()) return;
-    account << fmt::format(R"({{"camera":{},"frame_id":{},"timestamp_ns":{},"cycle":{},"slot":{},"tick":{}}})",
-                           frame.camera, frame.stamp.frame_id, frame.stamp.timestamp_ns, frame.cycle, frame.slot,
-                           frame.tick)
-            << '\n';
+void add_to_account(LineFile& account, const Frame& frame) {
+    account.add(fmt::format(R"({{"camera":{},"frame_id":{},"timestamp_ns":{},"cycle":{},"slot":{},"tick":{}}})",
+                            frame.camera, frame.stamp.frame_id, frame.stamp.timestamp_ns, frame.cycle, frame.slot,
+                            frame.tick));
 }
 
 TakeMasks masks_of(const Options& options) {
@@ -191,7 +193,7 @@ Result<int> run(const Options& options) {
     const auto targets = targets_of(options, *sequence);
     if (!targets.ok()) return targets.error();
     warn_of_long_cycles(*sequence, *targets);
-    auto account = open_account(options.frames);
+    auto account = open_account(options);
     if (!account.ok()) return account.error();
     auto archive = ArchiveWriter::create_beside(options.output, take_info(options, *sequence, *stage, *targets),
                                                 options.overwrite);
@@ -206,7 +208,9 @@ Result<int> run(const Options& options) {
                                  stop_on_signal());
     if (!report.ok()) return report.error();
     print_report(*report, sequence->basis.is_estimate, archive->folder(), options);
-    if (options.json) fmt::print("{}\n", to_json(*report, options).dump(1));
+    if (options.json) print_json(to_json(*report, options));
+    // The take is finished first, whatever became of its account.
+    if (const Status told = account->finish(); !told.ok()) return told.error();
     if (!report->write_error.empty()) return 1;
     return report->targets_missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
 }

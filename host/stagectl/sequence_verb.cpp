@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "program.hpp"
 #include "stage/flicker.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
@@ -136,7 +137,7 @@ Result<int> run(const Options& options) {
     if (!sequence.ok()) return sequence.error();
     const Summary summary = summarize(*sequence, *stage);
     if (options.json) {
-        fmt::print("{}\n", to_json(summary, *sequence).dump(1));
+        print_json(to_json(summary, *sequence));
     } else {
         if (options.slots) print_slots(*sequence);
         print_summary(summary, *sequence);

@@ -70,7 +70,8 @@ void show_progress(const char* label, uint64_t done, uint64_t total) {
     const int percent = total ? int(done * 100 / total) : 100;
     if (!terminal || percent == shown) return;
     shown = percent;
-    fmt::print(stderr, "\r{} {:3} %{}", label, percent, percent == 100 ? "\n" : "");
+    // Not fmt::print, which throws: no take ends because its terminal went away.
+    std::fprintf(stderr, "\r%s %3d %%%s", label, percent, percent == 100 ? "\n" : "");
 }
 
 }  // namespace ols

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/cycle_check.hpp"
+#include "program.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -17,8 +18,15 @@ struct Options {
     bool clear_fault = false, cycles = false, json = false;
 };
 
-// Reads the log that the board keeps and holds it against the digests it keeps.
-Status print_cycles(Board& board) {
+// A cycle that the board still keeps, and what holding its digest against its log gave.
+struct CheckedCycle {
+    ols_cycle_digest digest;
+    std::string problem;  // empty: as logged
+
+    bool is_incomplete() const { return digest.flags & OLS_DIGEST_INCOMPLETE; }
+};
+
+Result<std::vector<CheckedCycle>> check_cycles(Board& board) {
     std::vector<ols_trigger_log_entry> entries;
     for (uint32_t next = 0;;) {
         const auto log = board.read_trigger_log(next);
@@ -27,19 +35,39 @@ Status print_cycles(Board& board) {
         entries.insert(entries.end(), log->entries.begin(), log->entries.end());
         next = entries.back().counter + 1;
     }
+    std::vector<CheckedCycle> cycles;
     for (uint32_t next = 0;;) {
         const auto read = board.read_digests(next);
         if (!read.ok()) return read.error();
-        if (read->digests.empty()) return Done{};
+        if (read->digests.empty()) return cycles;
         for (const ols_cycle_digest& digest : read->digests) {
             const Status checked = check_cycle(digest, entries);
-            fmt::print("cycle {} of program {}: {} triggers, {} to {} ticks, {}{}\n", uint32_t(digest.cycle),
-                       digest.program, uint16_t(digest.trigger_count), uint64_t(digest.first_rise_ticks),
-                       uint64_t(digest.last_rise_ticks), checked.ok() ? "as logged" : checked.error().message,
-                       digest.flags & OLS_DIGEST_INCOMPLETE ? " (incomplete)" : "");
+            cycles.push_back({digest, checked.ok() ? "" : checked.error().message});
         }
         next = read->first_digest + uint32_t(read->digests.size());
     }
+}
+
+void print_cycles(const std::vector<CheckedCycle>& cycles) {
+    for (const CheckedCycle& cycle : cycles)
+        fmt::print("cycle {} of program {}: {} triggers, {} to {} ticks, {}{}\n", uint32_t(cycle.digest.cycle),
+                   cycle.digest.program, uint16_t(cycle.digest.trigger_count), uint64_t(cycle.digest.first_rise_ticks),
+                   uint64_t(cycle.digest.last_rise_ticks), cycle.problem.empty() ? "as logged" : cycle.problem,
+                   cycle.is_incomplete() ? " (incomplete)" : "");
+}
+
+nlohmann::json to_json(const std::vector<CheckedCycle>& cycles) {
+    auto json = nlohmann::json::array();
+    for (const CheckedCycle& cycle : cycles)
+        json.push_back({{"cycle", uint32_t(cycle.digest.cycle)},
+                        {"program", cycle.digest.program},
+                        {"triggers", uint16_t(cycle.digest.trigger_count)},
+                        {"first_tick", uint64_t(cycle.digest.first_rise_ticks)},
+                        {"last_tick", uint64_t(cycle.digest.last_rise_ticks)},
+                        {"as_logged", cycle.problem.empty()},
+                        {"problem", cycle.problem},
+                        {"incomplete", cycle.is_incomplete()}});
+    return json;
 }
 
 Result<int> run(const Options& options) {
@@ -51,27 +79,33 @@ Result<int> run(const Options& options) {
         if (const Status status = board->clear_fault(); !status.ok()) return status.error();
     const auto status = board->status();
     if (!status.ok()) return status.error();
+    std::vector<CheckedCycle> cycles;
+    if (options.cycles) {
+        auto checked = check_cycles(*board);
+        if (!checked.ok()) return checked.error();
+        cycles = std::move(*checked);
+    }
     const auto& info = board->info();
     if (options.json) {
-        const nlohmann::json json = {{"board", board->id()},
-                                     {"board_name", info.board},
-                                     {"firmware", info.firmware_version},
-                                     {"state", state_name(status->state)},
-                                     {"fault", fault_text(*status)},
-                                     {"chain_bits", uint16_t(info.chain_bits)},
-                                     {"slots_max", uint16_t(info.slots_max)},
-                                     {"slot_gap_ticks", uint32_t(info.slot_gap_ticks)},
-                                     {"triggers_fired", uint32_t(status->triggers_fired)},
-                                     {"cycles_played", uint32_t(status->cycles_played)},
-                                     {"log_entries_lost", uint32_t(status->log_entries_lost)}};
-        fmt::print("{}\n", json.dump(1));
+        nlohmann::json json = {{"board", board->id()},
+                               {"board_name", info.board},
+                               {"firmware", info.firmware_version},
+                               {"state", state_name(status->state)},
+                               {"fault", fault_text(*status)},
+                               {"chain_bits", uint16_t(info.chain_bits)},
+                               {"slots_max", uint16_t(info.slots_max)},
+                               {"slot_gap_ticks", uint32_t(info.slot_gap_ticks)},
+                               {"triggers_fired", uint32_t(status->triggers_fired)},
+                               {"cycles_played", uint32_t(status->cycles_played)},
+                               {"log_entries_lost", uint32_t(status->log_entries_lost)}};
+        if (options.cycles) json["cycles"] = to_json(cycles);
+        print_json(json);
     } else {
         fmt::print("board {} ({}), firmware {}: {}\nfault: {}\nchain of {} bits, {} slots at most, {} triggers fired\n",
                    board->id(), info.board, info.firmware_version, state_name(status->state), fault_text(*status),
                    uint16_t(info.chain_bits), uint16_t(info.slots_max), uint32_t(status->triggers_fired));
     }
-    if (options.cycles && !options.json)
-        if (const Status printed = print_cycles(*board); !printed.ok()) return printed.error();
+    if (!options.json) print_cycles(cycles);
     return 0;
 }
 

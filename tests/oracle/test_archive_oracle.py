@@ -139,7 +139,7 @@ def test_a_png_export_ingests_to_the_same_take(photographs, take, tmp_path):
 
 def test_export_refuses_a_directory_that_exists_and_a_target_that_does_not(take, tmp_path):
     assert "exists" in run("rf", "export", take, "-o", tmp_path, code=1)
-    assert "no such finished target" in run("rf", "export", take, "-o", tmp_path / "new", "--target", 4, code=1)
+    assert "no finished target 4" in run("rf", "export", take, "-o", tmp_path / "new", "--target", 4, code=1)
     assert list(tmp_path.iterdir()) == []
 
 

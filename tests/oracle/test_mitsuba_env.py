@@ -5,20 +5,18 @@ single-lamp pictures.
 Lamps stand for a map as far as 156 directions can. What they cannot resolve is measured apart: Mitsuba also renders the map
 after each lamp's cell was given its mean radiance. Skipped where mitsuba is not installed
 (`.venv/bin/pip install mitsuba`); the head comes from `make assets` or the folder OLS_ASSETS."""
-import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pictures import ROOT, ingested, read_exr, run, write_exr
+from pictures import MAP_HEIGHT, ROOT, cell_means, ingested, read_exr, run, sky, stage_lamps, write_exr
 
 mi = pytest.importorskip("mitsuba", reason="mitsuba is not installed: .venv/bin/pip install mitsuba")
 mi.set_variant("scalar_rgb")
 
 ASSETS = Path(os.environ.get("OLS_ASSETS", ROOT / ".cache/assets"))
 SIZE = 48
-MAP_HEIGHT = 128
 
 SPHERE = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [1, 1, 1]}}}
 
@@ -48,27 +46,9 @@ def lamp_light(direction):
     return light
 
 
-def sky(with_sun):
-    """A smooth coloured sky over dark ground, seen from inside: +Z in the middle, +X left of it. A sun adds a third of the light."""
-    height, width = MAP_HEIGHT, 2 * MAP_HEIGHT
-    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
-    longitude = np.pi * (1 - 2 * (np.arange(width) + 0.5) / width)[None, :]
-    up, towards_x = np.sin(latitude), np.cos(latitude) * np.sin(longitude)
-    base = 0.15 + 0.85 / (1 + np.exp(-6 * up))
-    rgb = base[..., None] * np.stack([0.7 + 0.4 * towards_x, 0.8 + 0 * towards_x, 1.0 - 0.3 * towards_x], axis=-1)
-    if with_sun:
-        disc = (np.abs(latitude - 0.7) < 0.04) & (np.abs(longitude - 1.0) < 0.04)
-        steradians = np.cos(latitude) * (np.pi / height) ** 2 * np.ones_like(longitude)
-        rgb[disc] += 0.5 * (rgb * steradians[..., None]).sum(axis=(0, 1)) / steradians[disc].sum()
-    return rgb
-
-
 @pytest.fixture(scope="module")
 def lamps(tmp_path_factory):
-    path = tmp_path_factory.mktemp("lamps") / "white.exr"
-    write_exr(path, np.ones((64, 128, 3)))
-    report = json.loads(run("rf", "weights", "--env", path, "--json"))
-    return np.array([lamp["direction"] for lamp in report["lamps"]])
+    return stage_lamps(tmp_path_factory.mktemp("lamps"))
 
 
 def archive_of(shape, half_width, lamps, folder, samples):
@@ -81,19 +61,6 @@ def relit(archive, rgb, folder, *options):
     write_exr(folder / "map.exr", rgb)
     run("rf", "relight", archive, "--env", folder / "map.exr", "--float", "-o", folder / "relit.exr", *options)
     return read_exr(folder / "relit.exr", "RGB")
-
-
-def cell_means(rgb, lamps):
-    """The map as 156 lamps can know it: each lamp's cell has its mean radiance."""
-    height, width, _ = rgb.shape
-    latitude = np.pi * (0.5 - (np.arange(height) + 0.5) / height)[:, None]
-    longitude = np.pi * (1 - 2 * (np.arange(width) + 0.5) / width)[None, :]
-    directions = np.stack(np.broadcast_arrays(np.cos(latitude) * np.sin(longitude), np.sin(latitude), np.cos(latitude) * np.cos(longitude)))
-    nearest = np.argmax(np.tensordot(lamps, directions, axes=1), axis=0)
-    steradians = np.cos(latitude) * np.ones_like(longitude)
-    area = np.bincount(nearest.ravel(), steradians.ravel(), minlength=len(lamps))
-    means = [np.bincount(nearest.ravel(), (rgb[..., c] * steradians).ravel(), minlength=len(lamps)) / area for c in range(3)]
-    return np.stack(means, axis=-1)[nearest]
 
 
 class Truth:

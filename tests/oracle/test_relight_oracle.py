@@ -140,7 +140,7 @@ def test_values_beyond_half_precision_are_reported(tmp_path):
 
 
 def test_the_white_furnace_is_white():
-    report = json.loads(run("rf", "furnace"))
+    report = json.loads(run("rf", "furnace", "--json"))
     assert report["white_furnace_error"] < 0.002
     assert report["worst_normal_deviation"] < 0.001
     assert abs(report["solid_angle_sr"] - 4 * np.pi) < 1e-9

@@ -4,12 +4,17 @@
 #include "image/whole_file.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
+
+#include "image/exr.hpp"
+#include "image/line_file.hpp"
 
 using namespace ols;
 namespace fs = std::filesystem;
@@ -88,4 +93,100 @@ TEST_F(WholeFile, a_missing_folder_is_named_with_what_to_do) {
     const Status done = write_whole_file(path("missing/a"), "text");
     ASSERT_FALSE(done.ok());
     EXPECT_NE(done.error().message.find("check that the folder exists"), std::string::npos);
+}
+
+TEST_F(WholeFile, names_that_look_like_ours_are_left_alone) {
+    const std::string stranger = "a.part" + std::to_string(getpid()) + "-0";
+    std::ofstream(path(stranger)) << "a stranger's";
+    ASSERT_TRUE(write_whole_file(path("a"), "new").ok());
+    ASSERT_FALSE(write_whole_file(path("a"), write_half).ok());
+    EXPECT_EQ(text_of("a"), "new");
+    EXPECT_EQ(text_of(stranger), "a stranger's");
+    EXPECT_EQ(names(), (std::set<std::string>{"a", stranger}));
+}
+
+TEST_F(WholeFile, a_name_of_the_greatest_length_can_be_written) {
+    const std::string name(255, 'n');
+    EXPECT_TRUE(write_whole_file(path(name), "text").ok());
+    EXPECT_EQ(names(), std::set<std::string>{name});
+}
+
+namespace {
+
+// Files may not grow beyond `bytes` while this lives, as on a disk that is full.
+class FileLimit {
+  public:
+    explicit FileLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+        getrlimit(RLIMIT_FSIZE, &before_);
+        const rlimit limit{bytes, before_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FileLimit() {
+        setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+
+  private:
+    rlimit before_{};
+    void (*handler_)(int);
+};
+
+}  // namespace
+
+TEST_F(WholeFile, on_a_full_disk_nothing_is_written_and_the_error_says_why) {
+    ASSERT_TRUE(write_whole_file(path("a"), "old").ok());
+    // Small pictures stay in a stream's buffer until its end, where OpenEXR's own stream forgets errors.
+    for (const auto& [width, bytes] : {std::pair{8, 100}, std::pair{400, 100'000}}) {
+        Image image(width, width, 3);
+        for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = float(i * 2654435761u % 100'003);
+        const FileLimit limit(bytes);
+        const Status done = write_exr(path("a"), image, ExrType::single_float);
+        ASSERT_FALSE(done.ok());
+        EXPECT_NE(done.error().message.find("cannot write '" + path("a") + "'"), std::string::npos);
+    }
+    EXPECT_EQ(text_of("a"), "old");
+    EXPECT_EQ(names(), std::set<std::string>{"a"});
+}
+
+TEST_F(WholeFile, a_folder_comes_with_all_that_was_put_into_it_or_not_at_all) {
+    std::string seen;
+    const auto fill = [&](const std::string& temporary) -> Status {
+        seen = temporary;
+        std::ofstream(temporary + "/x") << "x";
+        return Done{};
+    };
+    fs::create_directory(path("f.part"));  // another's
+    ASSERT_TRUE(make_whole_folder(path("f/"), fill).ok());
+    EXPECT_EQ(text_of("f/x"), "x");
+    EXPECT_FALSE(fs::exists(seen));
+    ASSERT_FALSE(make_whole_folder(path("g"), [&](const std::string& temporary) -> Status {
+                     if (const Status filled = fill(temporary); !filled) return filled;
+                     return fail("no more");
+                 }).ok());
+    EXPECT_FALSE(make_whole_folder(path("f"), fill).ok());
+    EXPECT_EQ(names(), (std::set<std::string>{"f", "f.part"}));
+}
+
+TEST_F(WholeFile, a_line_that_cannot_be_written_is_told_and_those_after_it_harm_nothing) {
+    LineFile full("/dev/full");
+    ASSERT_TRUE(full.status().ok());
+    full.add("one");
+    full.add("two");
+    EXPECT_FALSE(full.status().ok());
+    const Status done = full.finish();
+    ASSERT_FALSE(done.ok());
+    EXPECT_NE(done.error().message.find("/dev/full"), std::string::npos);
+    EXPECT_FALSE(LineFile(path("missing/a")).status().ok());
+}
+
+TEST_F(WholeFile, each_line_is_there_when_add_returns) {
+    LineFile account(path("account"));
+    account.add("one");
+    EXPECT_EQ(text_of("account"), "one\n");
+    account.add("two");
+    EXPECT_TRUE(account.finish().ok());
+    EXPECT_EQ(text_of("account"), "one\ntwo\n");
+    LineFile none("");
+    none.add("one");
+    EXPECT_TRUE(none.finish().ok());
 }

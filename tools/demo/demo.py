@@ -167,7 +167,7 @@ class Demo:
         with self.clock("verify archives, white furnace"):
             for basis, model in self.takes:
                 run(BIN / "rf", "verify", self.path(basis, model))
-            figures["white_furnace_error"] = run_json(BIN / "rf", "furnace")["white_furnace_error"]
+            figures["white_furnace_error"] = run_json(BIN / "rf", "furnace", "--json")["white_furnace_error"]
         return figures
 
 

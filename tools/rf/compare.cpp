@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/exr.hpp"
+#include "program.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -45,7 +46,7 @@ Status run(const Options& options) {
                                        {"mean_relative", finite_or_null(d.mean_relative)},
                                        {"bias_relative", finite_or_null(d.bias_relative)},
                                        {"equal", d.max_error == 0}};
-        fmt::print("{}\n", report.dump(1));
+        print_json(report);
     } else {
         fmt::print("PSNR {:.2f} dB (peak {:.6g}), largest error {:.6g}, mean error {:.4f} %, bias {:+.4f} %\n",
                    d.psnr_db, d.peak, d.max_error, 100 * d.mean_relative, 100 * d.bias_relative);

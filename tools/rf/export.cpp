@@ -10,9 +10,13 @@
 #include "archive/archive.hpp"
 #include "contact_sheet.hpp"
 #include "image/exr.hpp"
+#include "image/outputs.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
+#include "image/whole_file.hpp"
 #include "lamp_images.hpp"
+#include "program.hpp"
+#include "target_choice.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -23,19 +27,10 @@ namespace fs = std::filesystem;
 
 struct Options {
     std::string archive, output, format = "exr", contact_sheet;
-    int64_t target = -1;  // -1: the first finished one
-    uint32_t camera = 0;
+    TargetOptions targets;
     double exposure_ev = 0;
+    bool json = false;
 };
-
-Result<TargetEntry> chosen_target(const ArchiveReader& archive, const Options& options) {
-    for (const auto& entry : archive.targets())
-        if (!entry.file.empty() && entry.camera == options.camera &&
-            (options.target < 0 || entry.index == uint64_t(options.target)))
-            return entry;
-    return fail(fmt::format("'{}' has no such finished target of camera {}: rf info lists what there is",
-                            options.archive, options.camera));
-}
 
 // 8-bit sRGB without a tone curve, so that what reads the PNG gets linear values back; beyond 0 .. 1 it is clipped.
 std::vector<uint8_t> srgb8(const Image& rgb, double exposure_ev) {
@@ -57,71 +52,90 @@ Status write_lamp(const fs::path& path, const Image& rgb, const TakeInfo& info, 
     return write_exr(path.string(), exposed, ExrType::half_float, {{"colorInteropID", info.color_interop_id}});
 }
 
-// Pictures go to a directory under a temporary name, which gets its own when all is there.
+// What is made of one target.
 struct Export {
     const ArchiveReader& archive;
+    const TargetEntry& entry;
     const Options& options;
-    fs::path unfinished;                      // empty: no pictures are asked for
+    std::string folder = folder_of_target(options.output, entry, options.targets);
+    std::string sheet = file_of_target(options.contact_sheet, entry, options.targets);
     std::vector<LightPosition> written = {};  // names of pictures
+    ContactSheet::Picture picture = {};       // the contact sheet's
 
-    Status write(const TargetEntry& entry) {
+    Status write() {
+        if (folder.empty()) return write_to("");
+        return make_whole_folder(folder, [this](const std::string& temporary) { return write_to(temporary); });
+    }
+
+    // Pictures go to that folder; nowhere if it is empty.
+    Status write_to(const std::string& pictures) {
         const auto head = archive.read_head(entry.camera, entry.index);
         if (!head) return head.error();
         const auto& lights = archive.info().lights;
-        ContactSheet sheet(lights, head->width, head->height);
+        ContactSheet contact(lights, head->width, head->height);
         const auto visited = for_each_lamp_image(archive, entry, [&](int lamp, const Image& rgb) -> Status {
-            if (!options.contact_sheet.empty()) sheet.add(lamp, rgb);
-            if (unfinished.empty()) return Done{};
+            if (!sheet.empty()) contact.add(lamp, rgb);
+            if (pictures.empty()) return Done{};
             const std::string name = lamp_layer(lamp, int(lights.size())) + "." + options.format;
             written.push_back({name, lights[lamp].direction});
-            return write_lamp(unfinished / name, rgb, archive.info(), options);
+            return write_lamp(fs::path(pictures) / name, rgb, archive.info(), options);
         });
         if (!visited) return visited;
-        if (!unfinished.empty())
-            if (auto s = write_lp((unfinished / "lights.lp").string(), written); !s) return s;
-        return options.contact_sheet.empty() ? Status(Done{}) : write_sheet(sheet, entry);
+        if (!pictures.empty())
+            if (auto s = write_lp((fs::path(pictures) / "lights.lp").string(), written); !s) return s;
+        return sheet.empty() ? Status(Done{}) : write_sheet(contact);
     }
 
-    Status write_sheet(const ContactSheet& sheet, const TargetEntry& entry) {
+    Status write_sheet(const ContactSheet& contact) {
         const auto title = fmt::format("{}   camera {}   target {}   {} lamps, from the top down; front in the middle",
                                        fs::path(options.archive).lexically_normal().filename().string(), entry.camera,
                                        entry.index, archive.info().lights.size());
-        const auto picture = sheet.picture(title, options.exposure_ev);
-        if (auto s = write_png(options.contact_sheet, picture.width, picture.height, picture.rgb8); !s) return s;
-        fmt::print("{}: {} x {}, values times {:.4g}, then {}\n", options.contact_sheet, picture.width, picture.height,
-                   picture.gain, tone_curve_text);
-        return Done{};
+        picture = contact.picture(title, options.exposure_ev);
+        return write_png(sheet, picture.width, picture.height, picture.rgb8);
+    }
+
+    void print() const {
+        if (!sheet.empty())
+            fmt::print("{}: {} x {}, values times {:.4g}, then {}\n", sheet, picture.width, picture.height,
+                       picture.gain, tone_curve_text);
+        if (!folder.empty()) fmt::print("{}: {} pictures and lights.lp\n", folder, written.size());
+    }
+
+    nlohmann::json report() const {
+        nlohmann::json report = {{"camera", entry.camera}, {"target", entry.index}};
+        if (!folder.empty()) report["output"] = folder, report["pictures"] = written.size();
+        if (!sheet.empty()) report["contact_sheet"] = sheet, report["contact_sheet_gain"] = picture.gain;
+        return report;
     }
 };
 
+Status check_places(const Options& options, const std::vector<TargetEntry>& targets) {
+    Outputs outputs{.inputs = {options.archive}};
+    for (const auto& entry : targets) {
+        outputs.files.push_back(file_of_target(options.contact_sheet, entry, options.targets));
+        outputs.folders.push_back(folder_of_target(options.output, entry, options.targets));
+    }
+    return check_outputs(outputs);
+}
+
 Status run(const Options& options) {
     if (options.output.empty() && options.contact_sheet.empty())
-        return fail("nothing to do: give a directory with -o, or --contact-sheet");
+        return fail("nothing to do: give a folder with -o, or --contact-sheet");
     const auto archive = ArchiveReader::open(options.archive);
     if (!archive) return archive.error();
-    const auto entry = chosen_target(*archive, options);
-    if (!entry) return entry.error();
-
-    fs::path directory = fs::path(options.output).lexically_normal(), unfinished;
-    std::error_code error;
-    if (!options.output.empty()) {
-        if (!directory.has_filename()) directory = directory.parent_path();
-        if (fs::exists(directory, error)) return fail("'" + directory.string() + "' exists: choose a new directory");
-        unfinished = directory.string() + ".part";
-        fs::remove_all(unfinished, error);
-        if (!fs::create_directory(unfinished, error))
-            return fail("cannot make '" + unfinished.string() + "': " + error.message());
+    const auto targets = choose_targets(*archive, options.archive, options.targets);
+    if (!targets) return targets.error();
+    if (const auto writable = check_places(options, targets->finished); !writable) return writable;
+    if (const auto warning = targets->warning(); !warning.empty()) fmt::print(stderr, "rf export: {}\n", warning);
+    nlohmann::json report = {{"archive", options.archive}, {"missing_targets", targets->missing}};
+    for (const auto& entry : targets->finished) {
+        Export exporting{*archive, entry, options};
+        if (const auto done = exporting.write(); !done) return done;
+        report["targets"].push_back(exporting.report());
+        if (!options.json) exporting.print();
     }
-    Export exporting{*archive, options, unfinished};
-    Status done = exporting.write(*entry);
-    if (unfinished.empty()) return done;
-    if (done) {
-        fs::rename(unfinished, directory, error);
-        if (error) done = fail("cannot make '" + directory.string() + "': " + error.message());
-    }
-    if (!done) fs::remove_all(unfinished, error);
-    if (done) fmt::print("{}: {} pictures and lights.lp\n", directory.string(), exporting.written.size());
-    return done;
+    if (options.json) print_json(report);
+    return Done{};
 }
 
 }  // namespace
@@ -131,18 +145,17 @@ void add_export_verb(CLI::App& app, int& exit_code) {
     CLI::App* verb = app.add_subcommand("export", "write a target's lamp images as pictures, or a contact sheet");
     verb->footer(
         "Example: rf export take.rfa -o lamps --contact-sheet sheet.png\n"
+        "         rf export performance.rfa --target all -o lamps     # lamps_000000, lamps_000001 ...\n"
         "Pictures are R G B: mosaics are demosaiced. EXR is scene-linear half float; PNG is 8-bit sRGB of the linear "
         "values times 2^EV, clipped to 0..1. lights.lp lists the pictures by name.");
     verb->add_option("archive", options->archive, "take.rfa")->required();
-    verb->add_option("-o,--output", options->output, "directory to make");
+    verb->add_option("-o,--output", options->output, "folder to make");
     verb->add_option("--format", options->format, "exr or png")->check(CLI::IsMember({"exr", "png"}));
-    verb->add_option("--target", options->target, "number of the target (default: the first finished one)")
-        ->check(CLI::NonNegativeNumber)
-        ->type_name("N");
-    verb->add_option("--camera", options->camera, "camera of the target")->type_name("N");
+    options->targets.add_to(*verb);
     verb->add_option("--exposure", options->exposure_ev, "stops to brighten by")->type_name("EV");
     verb->add_option("--contact-sheet", options->contact_sheet,
                      "PNG of all lamp images, cut to the subject, placed as the lamps hang");
+    verb->add_flag("--json", options->json, "print a JSON report");
     verb->callback([options, &exit_code] {
         const auto status = run(*options);
         if (status) return;

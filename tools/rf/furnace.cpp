@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,7 @@
 
 #include "archive/archive.hpp"
 #include "lighting.hpp"
+#include "program.hpp"
 #include "relight/relight.hpp"
 #include "verbs.hpp"
 
@@ -104,10 +107,12 @@ Result<nlohmann::json> run(const std::string& lights_file) {
     const auto cells = cells_of_lights(lights);
     if (!cells) return cells.error();
     const auto normals = chart_normals();
-    const auto folder = std::filesystem::temp_directory_path() / fmt::format("rf-furnace-{}.rfa", getpid());
-    const auto target = through_archive(folder.string(), chart_target(normals, *cells), lights);
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
+    std::error_code error;
+    std::string folder = (std::filesystem::temp_directory_path(error) / "rf-furnace-XXXXXX").string();
+    if (mkdtemp(folder.data()) == nullptr)
+        return fail("cannot make '" + folder + "': " + std::strerror(errno) + ": set TMPDIR to a folder with space");
+    const auto target = through_archive(folder + "/chart.rfa", chart_target(normals, *cells), lights);
+    std::filesystem::remove_all(folder, error);
     if (!target) return target.error();
     const auto relit = relight({target->width, target->height, target->cfa, target->lamps},
                                integrate_environment(white_sky(), *cells));
@@ -130,20 +135,35 @@ Result<nlohmann::json> run(const std::string& lights_file) {
                           {"widest_cell_reach_deg", widest * 180 / pi}};
 }
 
+void print_report(const nlohmann::json& report) {
+    const auto figure = [&](const char* key) { return report[key].get<double>(); };
+    fmt::print("mean            {:.7f} over {} normals under {} lamps: {:.2g} off white\n", figure("mean"),
+               report["normals"].get<int>(), report["lamps"].get<int>(), figure("white_furnace_error"));
+    fmt::print("worst normal    {:.2g} off the closed form, relative\n", figure("worst_normal_deviation"));
+    fmt::print("normals         {:.4f} to {:.4f}\n", figure("darkest_normal"), figure("brightest_normal"));
+    fmt::print("cells           {:.6f} sr in all; the widest reaches {:.1f} degrees from its lamp\n",
+               figure("solid_angle_sr"), figure("widest_cell_reach_deg"));
+}
+
 }  // namespace
 
 void add_furnace_verb(CLI::App& app, int& exit_code) {
-    auto lights = std::make_shared<std::string>();
+    struct Options {
+        std::string lights;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
     CLI::App* verb = app.add_subcommand("furnace", "white furnace test: a white sphere under radiance 1 must show 1");
     verb->footer(
         "Example: rf furnace --lights lights.lp\n"
-        "Prints JSON: the mean over all normals, the normal that is farthest from the closed-form sum over the lamps'\n"
+        "Prints the mean over all normals, the normal that is farthest from the closed-form sum over the lamps'\n"
         "exact cells, and the darkest and brightest normals, which tell how far lamps stand in for a uniform sky.");
-    verb->add_option("--lights", *lights, "light positions (.lp); the stage's 156 lamps without");
-    verb->callback([lights, &exit_code] {
-        const auto report = run(*lights);
+    verb->add_option("--lights", options->lights, "light positions (.lp); the stage's 156 lamps without");
+    verb->add_flag("--json", options->json, "print JSON");
+    verb->callback([options, &exit_code] {
+        const auto report = run(options->lights);
         if (report) {
-            fmt::print("{}\n", report->dump(1));
+            options->json ? print_json(*report) : print_report(*report);
             return;
         }
         fmt::print(stderr, "rf furnace: {}\n", report.error().message);

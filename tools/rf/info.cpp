@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "archive/archive.hpp"
+#include "program.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -105,7 +106,7 @@ Status run(const std::string& path, bool as_json) {
     if (!archive) return archive.error();
     const json report = archive_report(*archive, path);
     if (as_json)
-        fmt::print("{}\n", report.dump(1));
+        print_json(report);
     else
         print_report(report, archive->info());
     return Done{};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // rf: what is done with reflectance functions after the take.
+#include "program.hpp"
 #include "verbs.hpp"
 
 int main(int argc, char** argv) {
@@ -15,6 +16,5 @@ int main(int argc, char** argv) {
     ols::add_weights_verb(app, exit_code);
     ols::add_furnace_verb(app, exit_code);
     ols::add_compare_verb(app, exit_code);
-    CLI11_PARSE(app, argc, argv);
-    return exit_code;
+    return ols::run_program(app, argc, argv, exit_code);
 }

@@ -12,10 +12,14 @@
 #include "archive/archive.hpp"
 #include "image/demosaic.hpp"
 #include "image/exr.hpp"
+#include "image/outputs.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
 #include "lighting.hpp"
+#include "mask_counts.hpp"
+#include "program.hpp"
 #include "shutter.hpp"
+#include "target_choice.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -23,8 +27,8 @@ namespace ols {
 namespace {
 
 struct Options {
-    std::string archive, target = "first", output, png;
-    uint32_t camera = 0;
+    std::string archive, output, png;
+    TargetOptions targets;
     LightingOptions lighting;
     ShutterOptions shutter;
     int threads = 0;
@@ -37,7 +41,7 @@ constexpr int tile_rows = 64;
 
 struct RelitTarget {
     Image image;  // R G B A, premultiplied; alpha is 0 outside the take's mask
-    size_t saturated = 0, missing = 0, outside = 0, clamped = 0;  // pixels with that mask bit
+    MaskCounts masked;
     size_t left_out_samples = 0;
     std::vector<int> missing_lamps;
 };
@@ -45,15 +49,6 @@ struct RelitTarget {
 int strip_rows(const Target& head, size_t lamps) {
     const size_t row_bytes = size_t(head.width) * lamps * head.planes() * sizeof(float);
     return int(std::max<size_t>(strip_bytes / row_bytes / tile_rows, 1)) * tile_rows;
-}
-
-void count_mask(const std::vector<uint32_t>& mask, RelitTarget& relit) {
-    for (uint32_t bits : mask) {
-        relit.saturated += (bits & mask_saturated) != 0;
-        relit.missing += (bits & mask_missing) != 0;
-        relit.outside += (bits & mask_outside) != 0;
-        relit.clamped += (bits & mask_clamped) != 0;
-    }
 }
 
 Image with_alpha(const Image& rgb, const std::vector<uint32_t>& mask) {
@@ -88,7 +83,7 @@ Result<RelitTarget> relight_target(const ArchiveReader& archive, const TargetEnt
         for (size_t samples : lit->left_out_samples) relit.left_out_samples += samples;
     }
     mask.resize(size_t(head->width) * head->height);
-    count_mask(mask, relit);
+    relit.masked.add(mask);
     relit.image = with_alpha(as_rgb(sum, head->cfa), mask);
     return relit;
 }
@@ -98,29 +93,6 @@ size_t values_beyond_half(const Image& image) {
     constexpr float largest_half = 65504;
     return size_t(
         std::count_if(image.data.begin(), image.data.end(), [](float v) { return std::abs(v) > largest_half; }));
-}
-
-Result<std::vector<TargetEntry>> chosen_targets(const ArchiveReader& archive, const Options& options) {
-    std::vector<TargetEntry> finished;
-    for (const auto& entry : archive.targets())
-        if (entry.camera == options.camera && !entry.file.empty()) finished.push_back(entry);
-    if (finished.empty())
-        return fail(fmt::format("'{}' has no finished target of camera {}: see `rf info {}`", options.archive,
-                                options.camera, options.archive));
-    if (options.target == "all") return finished;
-    if (options.target == "first") return std::vector{finished.front()};
-    for (const auto& entry : finished)
-        if (std::to_string(entry.index) == options.target) return std::vector{entry};
-    return fail(fmt::format("'{}' has no finished target {}: see `rf info {}`", options.archive, options.target,
-                            options.archive));
-}
-
-// out.exr, or out_000012.exr where several targets are written.
-std::string output_name(const std::string& path, const TargetEntry& entry, bool several) {
-    if (!several || path.empty()) return path;
-    const std::filesystem::path p(path);
-    return (p.parent_path() / fmt::format("{}_{:06}{}", p.stem().string(), entry.index, p.extension().string()))
-        .string();
 }
 
 std::map<std::string, std::string> header_attributes(const TakeInfo& info, const Options& options) {
@@ -138,6 +110,7 @@ std::map<std::string, std::string> header_attributes(const TakeInfo& info, const
 }
 
 void warn(const RelitTarget& relit, const std::string& file, double light_missing, size_t clamped_values) {
+    for (const auto& warning : relit.masked.warnings()) fmt::print(stderr, "rf relight: {}: {}\n", file, warning);
     if (!relit.missing_lamps.empty())
         fmt::print(stderr, "rf relight: {}: {} lamps are missing, and with them {:.2f} % of the light\n", file,
                    relit.missing_lamps.size(), 100 * light_missing);
@@ -151,7 +124,7 @@ void warn(const RelitTarget& relit, const std::string& file, double light_missin
 }
 
 Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const TargetEntry& entry,
-                                         const Lighting& lighting, const Options& options, bool several) {
+                                         const Lighting& lighting, const Options& options) {
     auto relit = relight_target(archive, entry, lighting.weights, options.threads);
     if (!relit) return relit.error();
     nlohmann::json shutter;
@@ -166,7 +139,8 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
     const double light_missing = share_of_light(lighting.weights, relit->missing_lamps);
     const size_t clamped_values = options.single_float ? 0 : values_beyond_half(relit->image);
     warn(*relit, entry.file, light_missing, clamped_values);
-    const auto output = output_name(options.output, entry, several), png = output_name(options.png, entry, several);
+    const auto output = file_of_target(options.output, entry, options.targets);
+    const auto png = file_of_target(options.png, entry, options.targets);
     const auto written =
         write_exr(output, relit->image, options.single_float ? ExrType::single_float : ExrType::half_float,
                   header_attributes(archive.info(), options));
@@ -184,11 +158,15 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
                           {"left_out_samples", relit->left_out_samples},
                           {"clamped_values", clamped_values},
                           {"shutter", shutter},
-                          {"masked_pixels",
-                           {{"saturated", relit->saturated},
-                            {"missing", relit->missing},
-                            {"outside", relit->outside},
-                            {"clamped", relit->clamped}}}};
+                          {"masked_pixels", relit->masked.report()}};
+}
+
+Status check_files(const Options& options, const std::vector<TargetEntry>& targets) {
+    Outputs outputs{.inputs = {options.archive, options.lighting.environment}};
+    for (const auto& entry : targets)
+        for (const auto& path : {options.output, options.png})
+            outputs.files.push_back(file_of_target(path, entry, options.targets));
+    return check_outputs(outputs);
 }
 
 Status run(const Options& options) {
@@ -196,23 +174,26 @@ Status run(const Options& options) {
     if (!archive) return archive.error();
     const auto cells = cells_of_lights(archive->info().lights);
     if (!cells) return fail("'" + options.archive + "': " + cells.error().message);
-    const auto targets = chosen_targets(*archive, options);
+    const auto targets = choose_targets(*archive, options.archive, options.targets);
     if (!targets) return targets.error();
+    if (const auto writable = check_files(options, targets->finished); !writable) return writable;
     if (options.shutter.is_open())
-        if (const auto known = check_motion_known(*archive, options.archive, *targets); !known) return known;
+        if (const auto known = check_motion_known(*archive, options.archive, targets->finished); !known) return known;
     const auto lighting = make_lighting(options.lighting, *cells);
     if (!lighting) return lighting.error();
     for (const auto& warning : lighting->warnings) fmt::print(stderr, "rf relight: {}\n", warning);
+    if (const auto warning = targets->warning(); !warning.empty()) fmt::print(stderr, "rf relight: {}\n", warning);
     nlohmann::json report = lighting->report;
     report["archive"] = options.archive;
     report["lamps"] = cells->size();
-    for (const auto& entry : *targets) {
-        const auto done = relight_and_write(*archive, entry, *lighting, options, options.target == "all");
+    report["missing_targets"] = targets->missing;
+    for (const auto& entry : targets->finished) {
+        const auto done = relight_and_write(*archive, entry, *lighting, options);
         if (!done) return done.error();
         report["targets"].push_back(*done);
         if (!options.json) fmt::print("{}\n", (*done)["output"].get<std::string>());
     }
-    if (options.json) fmt::print("{}\n", report.dump(1));
+    if (options.json) print_json(report);
     return Done{};
 }
 
@@ -229,9 +210,7 @@ void add_relight_verb(CLI::App& app, int& exit_code) {
     verb->add_option("archive", options->archive, "take.rfa")->required();
     options->lighting.add_to(*verb);
     options->shutter.add_to(*verb);
-    verb->add_option("--target", options->target, "number, `first` or `all` (then file names get _NNNNNN)")
-        ->type_name("N");
-    verb->add_option("--camera", options->camera, "camera of the targets")->type_name("N");
+    options->targets.add_to(*verb);
     verb->add_option("-o,--output", options->output, "OpenEXR file to write (R G B A)")->required();
     verb->add_option("--png", options->png, "8-bit preview to write");
     verb->add_flag("--float", options->single_float, "32-bit samples instead of 16-bit halves");

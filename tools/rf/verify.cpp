@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "archive/archive.hpp"
+#include "program.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -43,7 +44,7 @@ Result<size_t> run(const std::string& path, bool as_json) {
     if (!archive) return archive.error();
     const Verification found = archive->verify();
     if (as_json) {
-        fmt::print("{}\n", report_of(*archive, found).dump(1));
+        print_json(report_of(*archive, found));
         return found.problems.size();
     }
     for (const auto& file : found.intact) fmt::print("ok       {}\n", file);

@@ -7,6 +7,7 @@
 
 #include "archive/archive.hpp"
 #include "lighting.hpp"
+#include "program.hpp"
 #include "verbs.hpp"
 
 namespace ols {
@@ -69,7 +70,7 @@ Status run(const Options& options) {
     if (!lighting) return lighting.error();
     for (const auto& warning : lighting->warnings) fmt::print(stderr, "rf weights: {}\n", warning);
     if (options.json)
-        fmt::print("{}\n", weights_json(*lights, *cells, *lighting).dump(1));
+        print_json(weights_json(*lights, *cells, *lighting));
     else
         print_table(*lights, *cells, *lighting);
     return Done{};

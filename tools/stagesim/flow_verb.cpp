@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "image/outputs.hpp"
+#include "program.hpp"
 #include "render/true_flow.hpp"
 #include "run/inputs.hpp"
 #include "verbs.hpp"
@@ -23,6 +25,9 @@ struct FlowOptions {
 Status flow(const FlowOptions& options) {
     const auto inputs = read_inputs(options.inputs);
     if (!inputs) return inputs.error();
+    const Status writable =
+        check_outputs({.inputs = {options.inputs.scene, options.inputs.stage}, .files = {options.out}});
+    if (!writable) return writable;
     const TrueFlow truth = true_flow(inputs->scene, inputs->camera, options.from_us, options.to_us);
     if (const Status s = write_true_flow(options.out, truth, options.from_us, options.to_us); !s) return s;
 
@@ -38,11 +43,10 @@ Status flow(const FlowOptions& options) {
     }
     const double mean = seen > 0 ? sum / double(seen) : 0;
     if (options.json)
-        fmt::print("{}\n", nlohmann::json{{"subject_pixels", seen},
-                                          {"hidden_or_left_pixels", seen - visible},
-                                          {"longest_px", longest},
-                                          {"mean_px", mean}}
-                               .dump());
+        print_json({{"subject_pixels", seen},
+                    {"hidden_or_left_pixels", seen - visible},
+                    {"longest_px", longest},
+                    {"mean_px", mean}});
     else
         fmt::print(
             "{} pixels of subject; they move by {:.2f} px in the mean, {:.2f} px at most; {} are hidden at the end "
@@ -59,7 +63,7 @@ void add_flow_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "The EXR has two parts: flow (forward.u to the right and forward.v downwards, in pixels; NaN where nothing is "
         "seen) and mask (visible: 1 where the same point is still seen at the end).\nA cycle of 180 slots at 2160 Hz "
-        "lasts 83333 us.\nexample: stagesim flow tools/stagesim/scenes/motion_turn60.toml --from-us 0 --to-us 83333 -o "
+        "lasts 83333 us.\nExample: stagesim flow tools/stagesim/scenes/motion_turn60.toml --from-us 0 --to-us 83333 -o "
         "flow.exr");
     add_input_options(*verb, options->inputs);
     verb->add_option("--from-us", options->from_us, "the moment whose pixels are followed")->required();

@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "program.hpp"
 #include "run/inputs.hpp"
 #include "run/plan.hpp"
 #include "verbs.hpp"
@@ -38,7 +39,7 @@ Status plan(const PlanOptions& options) {
     }
     const nlohmann::json foretold = foretell(inputs->setup(options.camera_model), options.inputs.disabled_set());
     if (options.json)
-        fmt::print("{}\n", nlohmann::json{{"foretold", foretold}, {"actual", actual}}.dump(2));
+        print_json({{"foretold", foretold}, {"actual", actual}}, 2);
     else
         fmt::print("{}", plan_text(foretold, actual));
     return Done{};
@@ -49,7 +50,7 @@ Status plan(const PlanOptions& options) {
 void add_plan_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<PlanOptions>();
     CLI::App* verb = app.add_subcommand("plan", "say which effects a scene calls for, who calls, and what they cost");
-    verb->footer("example: stagesim plan tools/stagesim/scenes/head.toml");
+    verb->footer("Example: stagesim plan tools/stagesim/scenes/head.toml");
     add_input_options(*verb, options->inputs);
     verb->add_option("--work", options->work, "folder of an ended run: its actual cost is shown beside");
     verb->add_flag("--camera-model,!--no-camera-model", options->camera_model, "with the sensor's effects (default)");

@@ -8,8 +8,10 @@
 #include <numbers>
 
 #include "image/exr.hpp"
+#include "image/outputs.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
+#include "program.hpp"
 #include "relight/lamp_weights.hpp"
 #include "render/effects/vignetting.hpp"
 #include "render/renderer.hpp"
@@ -23,7 +25,7 @@ namespace {
 struct RenderOptions {
     InputOptions inputs;
     std::vector<int> lamps;
-    bool all_lamps = false, olat = false;
+    bool all_lamps = false, olat = false, json = false;
     std::string weights, env, env_convention, unit = "reflectance", out, png;
     double rotate_deg = 0, exposure_ev = 0, time_us = 0, png_gain = 1;
 };
@@ -106,30 +108,61 @@ Status write_picture(const RenderOptions& options, Image image, const CameraConf
     return write_png_preview(options.png, image);
 }
 
+std::string lamp_file(const RenderOptions& options, size_t lamp) {
+    return fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
+}
+
 Status render_olat(const RenderOptions& options, Renderer& renderer, const CameraConfig& camera) {
-    std::error_code error;
-    std::filesystem::create_directories(options.out, error);
-    if (error) return fail("cannot make folder '" + options.out + "': " + error.message());
     for (size_t lamp = 0; lamp < renderer.lamp_count(); ++lamp) {
         std::vector<Float3> weights(renderer.lamp_count());
         weights[lamp] = {1, 1, 1};
-        const std::string path = fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
-        if (const Status s = write_picture(options, renderer.light(weights, options.time_us), camera, path); !s)
-            return s;
+        const Status written =
+            write_picture(options, renderer.light(weights, options.time_us), camera, lamp_file(options, lamp));
+        if (!written) return written;
         show_progress("lamps", double(lamp + 1) / double(renderer.lamp_count()));
     }
     return Done{};
 }
 
+Status make_folder(const std::string& path) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) return fail("cannot make folder '" + path + "': " + error.message());
+    return Done{};
+}
+
+Status check_files(const RenderOptions& options, size_t lamps) {
+    Outputs outputs{.inputs = {options.inputs.scene, options.inputs.stage, options.weights, options.env}};
+    if (options.olat)
+        for (size_t lamp = 0; lamp < lamps; ++lamp) outputs.files.push_back(lamp_file(options, lamp));
+    else
+        outputs.files = {options.out, options.png};
+    return check_outputs(outputs);
+}
+
+nlohmann::json report(const RenderOptions& options, const Inputs& inputs, size_t lamps) {
+    nlohmann::json report = {{"output", options.out},          {"png", options.png},   {"width", inputs.camera.width},
+                             {"height", inputs.camera.height}, {"unit", options.unit}, {"at_us", options.time_us}};
+    if (options.olat) report["pictures"] = lamps;
+    return report;
+}
+
 Status render(const RenderOptions& options) {
     const auto inputs = read_inputs(options.inputs);
     if (!inputs) return inputs.error();
+    const size_t lamps = size_t(inputs->stage.lamp_count());
+    if (options.olat)
+        if (const Status made = make_folder(options.out); !made) return made;
+    if (const Status writable = check_files(options, lamps); !writable) return writable;
+    const auto weights = options.olat ? Result(std::vector<Float3>()) : chosen_weights(options, inputs->stage);
+    if (!weights) return weights.error();
     // Linear light: no sensor; gain and vignetting come with --unit counts.
     Renderer renderer(inputs->setup(false), options.inputs.disabled_set());
-    if (options.olat) return render_olat(options, renderer, inputs->camera);
-    const auto weights = chosen_weights(options, inputs->stage);
-    if (!weights) return weights.error();
-    return write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
+    const Status done =
+        options.olat ? render_olat(options, renderer, inputs->camera)
+                     : write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
+    if (done && options.json) print_json(report(options, *inputs, lamps));
+    return done;
 }
 
 }  // namespace
@@ -140,7 +173,7 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         fmt::format("Units: reflectance is pi L / E, 1 for white facing a lamp at the stage centre; counts are the "
                     "camera's counts a microsecond, with vignetting.\nPNG: {}.\n"
-                    "example: stagesim render tools/stagesim/scenes/head.toml --lamps 0,5 -o two.exr",
+                    "Example: stagesim render tools/stagesim/scenes/head.toml --lamps 0,5 -o two.exr",
                     tone_curve_text));
     add_input_options(*verb, options->inputs);
     auto* light = verb->add_option_group("light", "which lamps are on");
@@ -159,6 +192,7 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
     verb->add_option("--png", options->png, "preview file");
     verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve");
+    verb->add_flag("--json", options->json, "print what was written as JSON");
     verb->callback([options, &exit_code] {
         const Status status = options->out.empty() && (options->png.empty() || options->olat)
                                   ? Status(fail("nothing to write: give -o FILE.exr or --png FILE.png"))

@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <thread>
 
+#include "image/outputs.hpp"
 #include "image/whole_file.hpp"
+#include "program.hpp"
 #include "run/board_process.hpp"
 #include "run/inputs.hpp"
 #include "run/plan.hpp"
@@ -68,6 +70,8 @@ class StageRun {
         patience.join();
         for (auto& camera : cameras_) camera->finish();
         if (!status) return status;
+        for (auto& camera : cameras_)
+            if (const Status told = camera->truth_written(); !told) return told;
         if (gave_up_)
             return fail("frames waited in the ring for a reader that did not come: start the capture program first");
         if (board)
@@ -81,6 +85,10 @@ class StageRun {
         auto inputs = read_inputs(options_.inputs);
         if (!inputs) return inputs.error();
         inputs_ = std::move(*inputs);
+        const Status writable =
+            check_outputs({.inputs = {options_.inputs.scene, options_.inputs.stage, options_.image, options_.faults},
+                           .streams = {options_.vcd}});
+        if (!writable) return writable;
         std::vector<Fault> faults;
         if (!options_.faults.empty()) {
             auto read = read_faults(options_.faults);
@@ -112,6 +120,7 @@ class StageRun {
                                                            std::move(*ring),
                                                            fmt::format("{}/cam{}.frames.jsonl", options_.work, index),
                                                            faults, options_.pace == "virtual", cancelled_));
+        if (const Status told = cameras_.back()->truth_written(); !told) return told;
         Renderer& renderer = cameras_.back()->renderer();
         // The board starts when the lamps are done: its socket says that the stage is ready. A moving scene is looked at once, so
         // that its first frame comes soon after its trigger, not when the daemon takes the camera for dead.
@@ -210,7 +219,7 @@ class StageRun {
             report["cameras"].push_back(std::move(entry));
         }
         if (const Status s = write_whole_file(options_.work + "/cost.json", report.dump(2) + '\n'); !s) return s;
-        if (options_.json) fmt::print("{}\n", report.dump(2));
+        if (options_.json) print_json(report, 2);
         return Done{};
     }
 
@@ -233,7 +242,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Makes WORK/board.sock (the board's USB), WORK/cam0.ring (frames), WORK/cam0.frames.jsonl (which trigger and "
         "lamps made each frame: the truth that identification is held against) and, at the end, WORK/cost.json.\n"
-        "example: stagesim run tools/stagesim/scenes/head.toml --stage examples/stage.toml --work out/stage --once");
+        "Example: stagesim run tools/stagesim/scenes/head.toml --stage examples/stage.toml --work out/stage --once");
     add_input_options(*verb, options->inputs);
     verb->add_option("--work", options->work, "folder of sockets and rings")->required();
     verb->add_option("--image", options->image, "firmware image (default: the one built here)");

@@ -9,6 +9,7 @@
 #include <ImfMultiPartOutputFile.h>
 #include <ImfOutputPart.h>
 #include <ImfPartType.h>
+#include <ImfStdIO.h>
 #include <half.h>
 #include <tbb/parallel_for.h>
 
@@ -66,41 +67,49 @@ TrueFlow true_flow(const Scene& scene, const CameraConfig& config, double from_u
     return result;
 }
 
-Status write_true_flow(const std::string& path, const TrueFlow& flow, double from_us, double to_us) {
-    const int width = flow.flow.width, height = flow.flow.height;
-    return write_whole_file(path, [&](const std::string& temporary) -> Status {
-        try {
-            std::vector<Imf::Header> headers(2, Imf::Header(width, height));
-            headers[0].setName("flow");
-            headers[1].setName("mask");
-            for (Imf::Header& header : headers) {
-                header.setType(Imf::SCANLINEIMAGE);
-                header.insert("fromUs", Imf::DoubleAttribute(from_us));
-                header.insert("toUs", Imf::DoubleAttribute(to_us));
-            }
-            for (const char* name : {"forward.u", "forward.v"})
-                headers[0].channels().insert(name, Imf::Channel(Imf::FLOAT));
-            headers[1].channels().insert("visible", Imf::Channel(Imf::HALF));
-            Imf::MultiPartOutputFile file(temporary.c_str(), headers.data(), int(headers.size()));
+namespace {
 
-            const auto slice = [&](Imf::PixelType type, const void* data, size_t bytes) {
-                return Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * size_t(width));
-            };
-            Imf::FrameBuffer vectors, mask;
-            vectors.insert("forward.u", slice(Imf::FLOAT, flow.flow.u.data(), sizeof(float)));
-            vectors.insert("forward.v", slice(Imf::FLOAT, flow.flow.v.data(), sizeof(float)));
-            const std::vector<::half> visible(flow.visible.begin(), flow.visible.end());
-            mask.insert("visible", slice(Imf::HALF, visible.data(), sizeof(::half)));
-            Imf::OutputPart flow_part(file, 0), mask_part(file, 1);
-            flow_part.setFrameBuffer(vectors);
-            flow_part.writePixels(height);
-            mask_part.setFrameBuffer(mask);
-            mask_part.writePixels(height);
-            return Done{};
-        } catch (const std::exception& e) {
-            return fail("cannot write '" + path + "': " + e.what());
-        }
-    });
+std::string encoded(const TrueFlow& flow, double from_us, double to_us) {
+    const int width = flow.flow.width, height = flow.flow.height;
+    std::vector<Imf::Header> headers(2, Imf::Header(width, height));
+    headers[0].setName("flow");
+    headers[1].setName("mask");
+    for (Imf::Header& header : headers) {
+        header.setType(Imf::SCANLINEIMAGE);
+        header.insert("fromUs", Imf::DoubleAttribute(from_us));
+        header.insert("toUs", Imf::DoubleAttribute(to_us));
+    }
+    for (const char* name : {"forward.u", "forward.v"}) headers[0].channels().insert(name, Imf::Channel(Imf::FLOAT));
+    headers[1].channels().insert("visible", Imf::Channel(Imf::HALF));
+
+    const auto slice = [&](Imf::PixelType type, const void* data, size_t bytes) {
+        return Imf::Slice(type, static_cast<char*>(const_cast<void*>(data)), bytes, bytes * size_t(width));
+    };
+    Imf::FrameBuffer vectors, mask;
+    vectors.insert("forward.u", slice(Imf::FLOAT, flow.flow.u.data(), sizeof(float)));
+    vectors.insert("forward.v", slice(Imf::FLOAT, flow.flow.v.data(), sizeof(float)));
+    const std::vector<::half> visible(flow.visible.begin(), flow.visible.end());
+    mask.insert("visible", slice(Imf::HALF, visible.data(), sizeof(::half)));
+    Imf::StdOSStream stream;
+    {
+        Imf::MultiPartOutputFile file(stream, headers.data(), int(headers.size()));
+        Imf::OutputPart flow_part(file, 0), mask_part(file, 1);
+        flow_part.setFrameBuffer(vectors);
+        flow_part.writePixels(height);
+        mask_part.setFrameBuffer(mask);
+        mask_part.writePixels(height);
+    }  // its end writes the tables of lines
+    return stream.str();
+}
+
+}  // namespace
+
+Status write_true_flow(const std::string& path, const TrueFlow& flow, double from_us, double to_us) {
+    try {
+        return write_whole_file(path, encoded(flow, from_us, to_us));
+    } catch (const std::exception& e) {
+        return fail("cannot write '" + path + "': " + e.what());
+    }
 }
 
 }  // namespace ols

@@ -40,8 +40,8 @@ Result<Inputs> read_inputs(const InputOptions& options) {
 void show_progress(const char* what, double done) {
     if (!isatty(STDERR_FILENO)) return;
     const int filled = int(30 * done);
-    fmt::print(stderr, "\r{:<12} [{:<30}] {:3.0f} %{}", what, std::string(filled, '#'), 100 * done,
-               done >= 1 ? "\n" : "");
+    std::fprintf(stderr, "\r%-12s [%-30s] %3.0f %%%s", what, std::string(filled, '#').c_str(), 100 * done,
+                 done >= 1 ? "\n" : "");
     std::fflush(stderr);
 }
 

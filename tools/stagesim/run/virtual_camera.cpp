@@ -3,6 +3,7 @@
 #include "run/virtual_camera.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <chrono>
 #include <cmath>
@@ -79,15 +80,11 @@ void VirtualCamera::expose(const ExposureMessage& message) {
 
 void VirtualCamera::write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick,
                                 const std::vector<double>& lit_us) {
-    frames_file_ << fmt::format(R"({{"frame_id":{},"timestamp_ns":{},"trigger":{},"tick":{},"lit":[)", stamp.frame_id,
-                                stamp.timestamp_ns, trigger, tick);
-    const char* comma = "";
-    for (size_t lamp = 0; lamp < lit_us.size(); ++lamp) {
-        if (lit_us[lamp] == 0) continue;
-        frames_file_ << comma << lamp;
-        comma = ",";
-    }
-    frames_file_ << "]}\n" << std::flush;
+    std::vector<size_t> lit;
+    for (size_t lamp = 0; lamp < lit_us.size(); ++lamp)
+        if (lit_us[lamp] != 0) lit.push_back(lamp);
+    frames_file_.add(fmt::format(R"({{"frame_id":{},"timestamp_ns":{},"trigger":{},"tick":{},"lit":[{}]}})",
+                                 stamp.frame_id, stamp.timestamp_ns, trigger, tick, fmt::join(lit, ",")));
 }
 
 void VirtualCamera::deliver(Frame frame) {

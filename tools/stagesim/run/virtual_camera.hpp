@@ -4,11 +4,11 @@
 #pragma once
 
 #include <atomic>
-#include <fstream>
 #include <memory>
 #include <string>
 
 #include "device/ring.hpp"
+#include "image/line_file.hpp"
 #include "render/renderer.hpp"
 #include "run/board_messages.hpp"
 #include "run/faults.hpp"
@@ -43,6 +43,8 @@ class VirtualCamera {
     uint64_t triggers() const { return triggers_; }
     uint64_t delivered() const { return delivered_; }
     uint64_t dropped() const { return dropped_; }
+    // The first error of writing `frames_path`.
+    Status truth_written() const { return frames_file_.status(); }
     // Steady-clock nanoseconds since which a frame has been waiting for room in the ring, 0 when none is.
     int64_t waiting_since_ns() const { return waiting_since_ns_.load(); }
 
@@ -54,7 +56,7 @@ class VirtualCamera {
     Renderer renderer_;
     uint32_t index_;
     RingWriter ring_;
-    std::ofstream frames_file_;
+    LineFile frames_file_;
     FaultyDelivery delivery_;
     bool wait_for_reader_;
     const std::atomic<bool>& cancelled_;

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// What stagectl, rf and stagesim do around their verbs: --version, the exit code, and nothing that was printed is lost.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+namespace CLI {
+class App;
+}
+
+namespace ols {
+
+// Parses the command line, which runs a verb that sets `exit_code`, and returns what main returns. Adds --version. What
+// was printed and did not arrive (a full disk behind `>`, a closed standard output) is said on standard error and makes an exit
+// code of 0 a 1. A write beyond a limit of file sizes (ulimit -f) becomes an error of its file instead of ending the program.
+int run_program(CLI::App& app, int argc, char** argv, const int& exit_code);
+
+// Prints JSON and a new line to standard output, from any thread. Bytes that are not UTF-8 (names of files can have them) are
+// replaced. A failure shows at the end, in run_program().
+void print_json(const nlohmann::json& json, int indent = 1);
+inline constexpr int on_one_line = -1;  // an indent
+
+}  // namespace ols

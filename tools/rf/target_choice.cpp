@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Targets of one camera by number, the first, or all.
+#include "target_choice.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+
+namespace ols {
+
+namespace fs = std::filesystem;
+
+void TargetOptions::add_to(CLI::App& verb) {
+    verb.add_option("--target", target, "number, `first` (default) or `all` (then names get _NNNNNN)")->type_name("N");
+    verb.add_option("--camera", camera, "camera of the targets")->type_name("N");
+}
+
+std::string TargetChoice::warning() const {
+    if (missing.empty()) return "";
+    return fmt::format(
+        "{} targets are missing in the archive and left out, and their numbers with them: {}; rf info says why",
+        missing.size(), fmt::join(missing, ", "));
+}
+
+Result<TargetChoice> choose_targets(const ArchiveReader& archive, const std::string& path,
+                                    const TargetOptions& options) {
+    TargetChoice all;
+    for (const auto& entry : archive.targets()) {
+        if (entry.camera != options.camera) continue;
+        if (entry.file.empty())
+            all.missing.push_back(entry.index);
+        else
+            all.finished.push_back(entry);
+    }
+    if (all.finished.empty())
+        return fail(
+            fmt::format("'{}' has no finished target of camera {}: see `rf info {}`", path, options.camera, path));
+    if (options.takes_all()) return all;
+    if (options.target == "first") return TargetChoice{{all.finished.front()}, {}};
+    for (const auto& entry : all.finished)
+        if (std::to_string(entry.index) == options.target) return TargetChoice{{entry}, {}};
+    return fail(fmt::format("'{}' has no finished target {} of camera {}: see `rf info {}`", path, options.target,
+                            options.camera, path));
+}
+
+std::string file_of_target(const std::string& path, const TargetEntry& entry, const TargetOptions& options) {
+    if (!options.takes_all() || path.empty()) return path;
+    const fs::path p(path);
+    return (p.parent_path() / fmt::format("{}_{:06}{}", p.stem().string(), entry.index, p.extension().string()))
+        .string();
+}
+
+std::string folder_of_target(const std::string& path, const TargetEntry& entry, const TargetOptions& options) {
+    if (!options.takes_all() || path.empty()) return path;
+    fs::path folder = fs::path(path).lexically_normal();
+    if (!folder.has_filename()) folder = folder.parent_path();  // "lamps/"
+    return fmt::format("{}_{:06}", folder.string(), entry.index);
+}
+
+}  // namespace ols
