@@ -22,6 +22,7 @@ void add_basis_verb(CLI::App& app, int& exit_code) {
     list->footer("Example: stagectl basis list");
     list->callback(print_kinds);
     add_basis_report_verb(*verb, exit_code);
+    add_basis_export_verb(*verb, exit_code);
     add_basis_design_verb(*verb, exit_code);
 }
 
