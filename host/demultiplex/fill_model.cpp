@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The projector on the residuals by a rank-revealing QR, and the prior's form by Cholesky, both Eigen's.
+// The prior's form by Eigen's Cholesky factorisation.
 #include "demultiplex/fill_model.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -24,21 +23,6 @@ std::optional<Estimate> estimate_named(const std::string& name) {
     return Estimate(found - estimate_names().begin());
 }
 
-namespace {
-
-// Far above rounding, far below what the least bit of a level makes (stage/basis_inverse.hpp has the same).
-constexpr double rank_tolerance = 1e-9;
-
-Eigen::MatrixXd light_of_images(const Basis& basis) {
-    Eigen::MatrixXd light(basis.rows, basis.images());
-    for (int row = 0; row < basis.rows; ++row)
-        for (int image = 0; image < basis.images(); ++image)
-            light(row, image) = basis.light(row, basis.image_lamps[size_t(image)].front());
-    return light;
-}
-
-}  // namespace
-
 Eigen::MatrixXd smooth_kernel(const std::vector<LightPosition>& lights, const SmoothPrior& prior) {
     const auto n = Eigen::Index(lights.size());
     Eigen::MatrixXd kernel(n, n);
@@ -51,28 +35,14 @@ Eigen::MatrixXd smooth_kernel(const std::vector<LightPosition>& lights, const Sm
     return kernel;
 }
 
-bool is_one_image_a_row(const Basis& basis) {
-    for (int row = 0; row < basis.rows; ++row)
-        for (int image = 0; image < basis.images(); ++image)
-            if ((basis.inverse(row, image) != 0) != (row == image)) return false;
-    return true;
-}
-
 FillModel fill_model(const Basis& basis) {
     FillModel model;
     model.inverse.resize(basis.images(), basis.rows);
     for (int row = 0; row < basis.rows; ++row)
         for (int image = 0; image < basis.images(); ++image) model.inverse(image, row) = basis.inverse(row, image);
-    model.residual = Eigen::MatrixXd::Zero(basis.rows, basis.rows);
-    if (!is_one_image_a_row(basis)) {
-        Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
-        qr.setThreshold(rank_tolerance);
-        qr.compute(light_of_images(basis));
-        model.redundancy = basis.rows - int(qr.rank());
-        const Eigen::MatrixXd unexplained =
-            Eigen::MatrixXd(qr.householderQ()).rightCols(model.redundancy);  // orthonormal, the left null space of P
-        model.residual = unexplained * unexplained.transpose();
-    }
+    RowResidual residual = row_residual(basis);
+    model.residual = std::move(residual.projector);
+    model.redundancy = residual.redundancy;
     model.spread = model.inverse.transpose() * model.inverse;
     return model;
 }

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "stage/basis.hpp"
+#include "stage/row_losses.hpp"
 
 namespace ols {
 
@@ -72,8 +72,5 @@ FillModel fill_model(const Basis& basis);
 
 // `lights` are those of the images, image_lights() of the basis.
 void add_smooth_prior(FillModel& model, const std::vector<LightPosition>& lights, const SmoothPrior& prior = {});
-
-// Whether each image rests on its own row alone, so that a lost row takes one image with it.
-bool is_one_image_a_row(const Basis& basis);
 
 }  // namespace ols

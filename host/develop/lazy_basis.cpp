@@ -47,6 +47,19 @@ double tracking_rate_hz(const Sequence& sequence) {
     return double(tracking_slots(sequence).size()) * double(tick_hz) / double(sequence.cycle_ticks());
 }
 
+double target_rate_hz(const Sequence& sequence, int every) {
+    return tracking_rate_hz(sequence) / every;
+}
+
+// The cameras' frame rates nearest to the sequence's, below and above, whose tracking frames are a multiple of fps.
+static std::string frame_rates_for(const Sequence& sequence, double fps) {
+    const double rate = tracking_rate_hz(sequence);
+    const double slots = double(sequence.slots.size()) / double(tracking_slots(sequence).size());
+    const double below = std::floor(rate / fps) * fps * slots, above = std::ceil(rate / fps) * fps * slots;
+    return below > 0 ? fmt::format("{:.6g}, or {:.6g} where the cameras can", below, above)
+                     : fmt::format("{:.6g}", above);
+}
+
 Result<int> tracking_frames_a_target(const Sequence& sequence, double fps) {
     const double rate = tracking_rate_hz(sequence);
     if (rate == 0) return fail("the sequence has no tracking slots: motion cannot be compensated without");
@@ -56,8 +69,8 @@ Result<int> tracking_frames_a_target(const Sequence& sequence, double fps) {
     for (const int n : {1, 2, 3, 4, 5, 6, 8, 10}) rates += fmt::format("{}{:.5g}", n > 1 ? ", " : "", rate / n);
     return fail(
         fmt::format("{} targets a second: targets stand at tracking frames, of which a second has {:.5g}; there "
-                    "can be {} a second",
-                    fps, rate, rates));
+                    "can be {} a second. For {}, say in the sequence frame_rate_hz = {}",
+                    fps, rate, rates, fps, frame_rates_for(sequence, fps)));
 }
 
 std::vector<int> evenly_apart(const Sequence& sequence, int every, double apart_s) {

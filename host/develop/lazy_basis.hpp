@@ -19,8 +19,11 @@ double tracking_rate_hz(const Sequence& sequence);
 
 // At every how manieth tracking frame a target stands for `fps` targets a second: with the paper's 120 tracking frames a
 // second, 2, 4 and 5 for 60, 30 and 24. Errors: the tracking rate is no multiple of fps (to a thousandth); names the rates
-// there are. No tracking slots.
+// there are, and the cameras' frame rates with which there would be fps. No tracking slots.
 Result<int> tracking_frames_a_target(const Sequence& sequence, double fps);
+
+// Targets a second, exactly, which what was asked for may differ from by a thousandth: 24 from 23.976.
+double target_rate_hz(const Sequence& sequence, int every);
 
 // Of the `every` tracking frames from a target to the next, those that split the time between as evenly as whole frames allow, into
 // as many parts as can last `apart_s` on average: counted from the target's own, which is 0 and the first of them. With 0 all.

@@ -127,7 +127,7 @@ Result<Basis> read_basis(const std::string& path, int lamps) {
     return inverted;
 }
 
-Status write_basis(const std::string& path, const Basis& basis, const std::string& comment) {
+std::string basis_text(const Basis& basis, const std::string& comment) {
     std::string text;
     std::istringstream lines(comment);
     for (std::string line; std::getline(lines, line);) text += "# " + line + "\n";
@@ -135,7 +135,11 @@ Status write_basis(const std::string& path, const Basis& basis, const std::strin
     for (int r = 0; r < basis.rows; ++r)
         for (int lamp = 0; lamp < basis.lamps; ++lamp)
             text += fmt::format("{}{}", basis.level(r, lamp), lamp + 1 < basis.lamps ? "," : "\n");
-    return write_whole_file(path, text);
+    return text;
+}
+
+Status write_basis(const std::string& path, const Basis& basis, const std::string& comment) {
+    return write_whole_file(path, basis_text(basis, comment));
 }
 
 }  // namespace ols

@@ -20,7 +20,10 @@ namespace ols {
 // rows than a board plays slots.
 Result<Basis> read_basis(const std::string& path, int lamps);
 
-// Writes the levels of any basis; `comment`, if any, becomes comment lines. Never leaves a half-written file.
+// The levels of any basis as such text; `comment`, if any, becomes comment lines.
+std::string basis_text(const Basis& basis, const std::string& comment = "");
+
+// Writes it. Never leaves a half-written file.
 Status write_basis(const std::string& path, const Basis& basis, const std::string& comment = "");
 
 }  // namespace ols

@@ -10,8 +10,6 @@ namespace ols {
 
 namespace {
 
-constexpr double rank_tolerance = 1e-9;
-
 using Svd = Eigen::BDCSVD<Eigen::MatrixXd>;
 
 Eigen::MatrixXd light_of(const Basis& basis, const std::vector<int>& lamps) {

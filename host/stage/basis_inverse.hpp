@@ -13,6 +13,9 @@ namespace ols {
 // lamp holds, would already move a result by 100 %.
 constexpr double condition_max = 1e4;
 
+// Singular values below this share of the largest count as zero: far above rounding, far below what a level's least bit makes.
+constexpr double rank_tolerance = 1e-9;
+
 struct MatrixFigures {
     int rank = 0;
     double condition = 0;                 // largest over smallest singular value that counts for the rank
@@ -22,9 +25,8 @@ struct MatrixFigures {
 MatrixFigures matrix_figures(const Basis& basis);
 
 // Gives the basis one image a lamp that is lit, and the pseudo-inverse of its light (Golub and Van Loan, "Matrix
-// Computations", 4th ed., 5.5.2) as its inversion. Singular values below 1e-9 of the largest, far above rounding and far
-// below what a level's least bit can make, count as zero; with any such the images are an estimate (is_estimate), the
-// shortest vector of lamps that explains the rows. Error: a condition number above condition_max, with advice.
+// Computations", 4th ed., 5.5.2) as its inversion. With singular values that count as zero the
+// images are an estimate (is_estimate), the shortest vector of lamps that explains the rows. Error: a condition number above condition_max, with advice.
 Result<Basis> with_least_squares(Basis basis);
 
 }  // namespace ols

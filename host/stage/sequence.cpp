@@ -184,6 +184,13 @@ uint64_t Sequence::cycle_ticks() const {
     return ticks;
 }
 
+std::vector<int> Sequence::order_of_play() const {
+    std::vector<int> rows;
+    for (const Slot& slot : slots)
+        if (slot.kind == SlotKind::basis && slot.row >= 0) rows.push_back(slot.row);
+    return rows;
+}
+
 uint32_t grey_exposure_ticks(double exposure_us, uint8_t planes) {
     const int64_t units = planes ? (1 << planes) - 1 : 1;
     return uint32_t(units * std::llround(exposure_us * double(ticks_per_us) / double(units)));

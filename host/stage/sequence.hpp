@@ -76,6 +76,8 @@ struct Sequence {
     uint64_t cycle_ticks() const;
     // Whether its frames invert to single lamps; listed slots and harmonics do not.
     bool is_capture() const { return basis.rows > 0; }
+    // The rows of the basis in the order of play.
+    std::vector<int> order_of_play() const;
     uint64_t trigger_count() const { return uint64_t(config.cycles) * slots.size(); }
 };
 
@@ -84,7 +86,8 @@ struct Sequence {
 Result<SequenceConfig> read_sequence(const std::string& path);
 
 // Lays out the cycle: groups of tracking, matte and basis places, as many as hold every row of the basis and at least
-// one dark slot. Rows stand where each lamp's light spreads evenly over the cycle (stage/slot_order.hpp). Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
+// one dark slot. Rows stand where the loss of neighbours can be made up for and
+// each lamp's light spreads evenly over the cycle (stage/slot_order.hpp). Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
 // place of its own: no two dark slots have the same distance to their group's tracking slot, so that each of them
 // alone tells where in the cycle it is.
 // Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Descent by pairs; a swap's change is read off the product of similarity and closeness, which is kept up to date.
+// Descent by pairs. A swap's change in flicker is read off the product of similarity and closeness, which is kept up to date; its
+// change in bursts off the windows around both places.
 #include "stage/slot_order.hpp"
 
 #include <Eigen/Dense>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <numeric>
+
+#include "stage/row_losses.hpp"
 
 namespace ols {
 
@@ -54,13 +58,65 @@ MatrixXd closeness_of(const std::vector<int>& places, int slots) {
     return in_units(closeness);
 }
 
+// Counts the bursts of an order that the other rows do not make up for; one pair of neighbours outweighs all longer ones.
+class LostBursts {
+  public:
+    explicit LostBursts(const Basis& basis) : losses_(basis), rows_(size_t(basis.rows)) {
+        if (losses_.redundancy() < 2) return;
+        lost_pairs_.resize(rows_ * rows_);
+        for (size_t i = 0; i < rows_; ++i)
+            for (size_t j = 0; j < rows_; ++j)
+                lost_pairs_[i * rows_ + j] = i == j || !losses_.makes_up_for(std::array{int(i), int(j)});
+    }
+
+    int64_t count(const std::vector<int>& order) const {
+        int64_t sum = 0;
+        for (size_t first = 0; first < rows_; ++first) sum += beginning_at(first, order);
+        return sum;
+    }
+
+    // Those that a row at one of two places is part of, and some others that it is not.
+    int64_t count_around(size_t a, size_t b, const std::vector<int>& order) const {
+        int64_t sum = 0;
+        for (size_t back = 0; back < longest; ++back) {
+            const size_t first = (a + rows_ - back) % rows_;
+            sum += beginning_at(first, order);
+            const size_t other = (b + rows_ - back) % rows_;
+            if ((a + rows_ - other) % rows_ >= longest) sum += beginning_at(other, order);  // not counted for a already
+        }
+        return sum;
+    }
+
+  private:
+    static constexpr size_t longest = 3;
+
+    bool is_lost(int i, int j) const { return lost_pairs_[size_t(i) * rows_ + size_t(j)]; }
+
+    int64_t beginning_at(size_t first, const std::vector<int>& order) const {
+        if (lost_pairs_.empty()) return 0;
+        const int i = order[first], j = order[(first + 1) % rows_], k = order[(first + 2) % rows_];
+        const bool neighbours = is_lost(i, j), at_two = is_lost(i, k);
+        const bool three = losses_.redundancy() >= 3 &&
+                           (neighbours || at_two || is_lost(j, k) || !losses_.makes_up_for(std::array{i, j, k}));
+        return neighbours * int64_t(2 * rows_ + 1) + at_two + three;
+    }
+
+    RowLosses losses_;
+    size_t rows_;
+    std::vector<uint8_t> lost_pairs_;  // rows x rows; empty where no two rows can be spared
+};
+
 class Spreading {
   public:
     Spreading(const Basis& basis, const std::vector<int>& places, int slots)
-        : similarity_(similarity_of(basis)), closeness_(closeness_of(places, slots)), order_(places.size()) {
+        : lost_bursts_(basis),
+          similarity_(similarity_of(basis)),
+          closeness_(closeness_of(places, slots)),
+          order_(places.size()) {
         const int64_t stride = stride_of(basis.rows);
         for (int64_t p = 0; p < basis.rows; ++p) order_[size_t(p)] = int(p * stride % basis.rows);
         attraction_ = similarity_(Eigen::all, order_) * closeness_;
+        lost_ = lost_bursts_.count(order_);
         least_gain_ = closeness_(0, 0) * similarity_.trace() * 1e-6;
     }
 
@@ -76,14 +132,24 @@ class Spreading {
         const auto n = Index(order_.size());
         for (Index a = 0; a < n; ++a)
             for (Index b = a + 1; b < n; ++b)
-                if (change_of(a, b) < -least_gain_) {
-                    swap(a, b);
-                    swapped = true;
-                }
+                if (swap_if_better(a, b)) swapped = true;
         return swapped;
     }
 
-    // Half of what the sum over all pairs of places changes by when the rows at a and b change places.
+    bool swap_if_better(Index a, Index b) {
+        const bool is_more_even = change_of(a, b) < -least_gain_;
+        if (!is_more_even && lost_ == 0) return false;
+        const int64_t before = lost_bursts_.count_around(size_t(a), size_t(b), order_);
+        std::swap(order_[size_t(a)], order_[size_t(b)]);
+        const int64_t after = lost_bursts_.count_around(size_t(a), size_t(b), order_);
+        std::swap(order_[size_t(a)], order_[size_t(b)]);
+        if (after > before || (after == before && !is_more_even)) return false;
+        lost_ += after - before;
+        swap(a, b);
+        return true;
+    }
+
+    // Half of what the unevenness, a sum over all pairs of places, changes by when the rows at a and b change places.
     double change_of(Index a, Index b) const {
         const int i = order_[size_t(a)], j = order_[size_t(b)];
         return attraction_(j, a) - attraction_(j, b) - attraction_(i, a) + attraction_(i, b) +
@@ -97,10 +163,12 @@ class Spreading {
         std::swap(order_[size_t(a)], order_[size_t(b)]);
     }
 
+    LostBursts lost_bursts_;
     MatrixXd similarity_, closeness_;
     MatrixXd attraction_;  // of a row by a place: over all places, similarity of the row there times closeness
     std::vector<int> order_;
     double least_gain_ = 0;
+    int64_t lost_ = 0;  // bursts of the order
 };
 
 }  // namespace

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -17,6 +19,7 @@ struct TomlSection::File {
     std::string path;
     toml::table root;
     std::set<const toml::node*> read;
+    std::set<std::string> asked;  // with the dots before them, whether they were there or not
     std::optional<Error> first_error;
 
     void note(const toml::source_region& where, const std::string& message) {
@@ -32,6 +35,27 @@ const toml::table& as_table(const void* table) {
 
 const toml::node* as_node(const void* node) {
     return static_cast<const toml::node*>(node);
+}
+
+// How many letters must be put in, left out or changed to make one word of the other (Levenshtein 1966).
+size_t edit_distance(const std::string& a, const std::string& b) {
+    std::vector<size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), size_t(0));
+    for (size_t i = 1; i <= a.size(); ++i) {
+        size_t diagonal = row[0]++;
+        for (size_t j = 1; j <= b.size(); ++j) {
+            const size_t changed = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
+        }
+    }
+    return row.back();
+}
+
+// A dotted name's table, with its dot, and its key.
+std::pair<std::string, std::string> split_name(const std::string& name) {
+    const size_t begin = name.rfind('.') + 1;  // 0 without a dot
+    return {name.substr(0, begin), name.substr(begin)};
 }
 
 // The first key, in file order, that was never asked for, with the dots before it.
@@ -79,11 +103,13 @@ Result<TomlSection> TomlSection::open(const std::string& path) {
 
 const void* TomlSection::find(const std::string& key) {
     const toml::node* node = as_table(table_).get(key);
+    file_->asked.insert(prefix_ + key);
     if (node) file_->read.insert(node);
     return node;
 }
 
 bool TomlSection::has(const std::string& key) const {
+    file_->asked.insert(prefix_ + key);
     return as_table(table_).get(key) != nullptr;
 }
 
@@ -182,11 +208,36 @@ std::vector<TomlSection> TomlSection::sections(const std::string& key) {
     return found;
 }
 
+std::string TomlSection::describe_unread(const std::string& name) const {
+    const auto [table, key] = split_name(name);
+    size_t nearest = std::max<size_t>(1, key.size() / 3) + 1;  // with more letters wrong it is another word
+    std::string meant, elsewhere, known;
+    for (const std::string& asked : file_->asked) {
+        const auto [asked_table, asked_key] = split_name(asked);
+        if (asked_table != table) {
+            if (asked_key != key) continue;
+            elsewhere += elsewhere.empty() ? "" : " or ";
+            elsewhere += asked_table.empty() ? "before the file's first table"
+                                             : "in the table " + asked_table.substr(0, asked_table.size() - 1);
+            continue;
+        }
+        known += (known.empty() ? "" : ", ") + asked_key;
+        const bool lacks_unit = asked_key.starts_with(key + "_");
+        if (const size_t distance = lacks_unit ? 1 : edit_distance(key, asked_key); distance < nearest) {
+            nearest = distance;
+            meant = asked_key;
+        }
+    }
+    if (!elsewhere.empty()) return "it belongs " + elsewhere;
+    if (!meant.empty()) return "did you mean " + meant + "?";
+    return known.empty() ? "nothing may stand there" : "known there: " + known;
+}
+
 Status TomlSection::finish() const {
     if (file_->first_error) return *file_->first_error;
     if (const auto unread = find_unread(file_->root, file_->read, ""))
-        return fail(fmt::format("{}:{}: {} is not a key that is known here: check its spelling and its table",
-                                file_->path, unread->second.begin.line, unread->first));
+        return fail(fmt::format("{}:{}: {} is not a key that is known here; {}", file_->path, unread->second.begin.line,
+                                unread->first, describe_unread(unread->first)));
     return Done{};
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Strict reading of configuration files: every value is checked, every unknown key is an error, and every error names
-// file, line and key.
+// file, line and key, and for an unknown key the one that was meant.
 #pragma once
 
 #include <array>
@@ -54,7 +54,8 @@ class TomlSection {
     // Notes that a value is wrong in a way the read functions cannot know: `what` follows "file:line: key ".
     void reject(const std::string& key, const std::string& what);
 
-    // The first error of the whole file: a wrong value, or a key that nobody has read.
+    // The first error of the whole file: a wrong value, or a key that nobody has read. Of such a key it says which
+    // tables have it, or which of its own table's is nearest, of those that were asked for, or else all of these.
     Status finish() const;
 
     // A path of the file made relative to the file's own folder.
@@ -64,6 +65,7 @@ class TomlSection {
     struct File;
     TomlSection(std::shared_ptr<File> file, const void* table, std::string prefix);
     const void* find(const std::string& key);
+    std::string describe_unread(const std::string& name) const;
 
     std::shared_ptr<File> file_;
     const void* table_;   // toml::table, kept out of this header: toml++ is slow to compile

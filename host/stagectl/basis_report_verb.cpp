@@ -13,6 +13,7 @@
 #include "stage/camera_presets.hpp"
 #include "stage/flicker.hpp"
 #include "stagectl/basis_plot.hpp"
+#include "stagectl/lost_slots.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -135,6 +136,7 @@ nlohmann::json to_json(const Report& report, const GreyChart& chart) {
         {"longest_dark_ms", report.dark_longest_ms},
         {"duty_mean", report.duty_mean},
         {"cycle_modulation_mean", report.cycle_modulation_mean},
+        {"lost_slots", lost_slots_json(report.sequence)},
         {"flicker_whole", {{"hz", report.whole.hz}, {"modulation", report.whole.modulation}}}};
 }
 
@@ -170,6 +172,7 @@ void print_report(const Report& report, const GreyChart& chart) {
         report.strobe_lowest_hz, report.duty_mean * 100, report.dark_longest_ms, report.cycle_modulation_mean * 100,
         1e3 / cycle_ms);
     fmt::print("flicker      {:.1f} % of all light at {:.1f} Hz\n", report.whole.modulation * 100, report.whole.hz);
+    fmt::print("lost slots   {}\n", describe_lost_slots(report.sequence));
 }
 
 Result<int> run(const Options& options) {

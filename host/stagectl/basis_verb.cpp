@@ -35,6 +35,7 @@ void add_basis_verb(CLI::App& app, int& exit_code) {
     list->add_flag("--json", *as_json, "print as JSON");
     list->callback([as_json] { print_kinds(*as_json); });
     add_basis_report_verb(*verb, exit_code);
+    add_basis_export_verb(*verb, exit_code);
     add_basis_design_verb(*verb, exit_code);
 }
 

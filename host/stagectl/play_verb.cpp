@@ -7,6 +7,7 @@
 #include "program.hpp"
 #include "record/board_log.hpp"
 #include "record/recorder.hpp"
+#include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -63,6 +64,7 @@ Result<int> run(const Options& options) {
     if (!sequence.ok()) return sequence.error();
     auto board = open_board(options.links, *stage);
     if (!board.ok()) return board.error();
+    warn_of_flicker(*sequence);
     if (const Status status = start_board(*board, *sequence, *stage); !status.ok()) return status.error();
     Account account;
     follow(*board, options.json, account);

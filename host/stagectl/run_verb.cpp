@@ -6,6 +6,7 @@
 #include "image/line_file.hpp"
 #include "image/outputs.hpp"
 #include "program.hpp"
+#include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -164,6 +165,15 @@ Result<TakeTargets> targets_of(const Options& options, const Sequence& sequence)
     return targets;
 }
 
+// Rates are whole ticks: 24 may be 24.0002, and where the cameras' rate was set for film on video, 23.976.
+void say_exact_rate(const Options& options, const Sequence& sequence, const TakeTargets& targets) {
+    if (targets.every > 0)
+        fmt::print(stderr,
+                   "stagectl: --fps {} is {:.7g} targets a second here, and so the archive says: {:.7g} tracking "
+                   "frames a second, {} to a target\n",
+                   options.fps, target_rate_hz(sequence, targets.every), tracking_rate_hz(sequence), targets.every);
+}
+
 // Wenger's flow holds for 1/24 s; longer cycles take frames from farther away.
 void warn_of_long_cycles(const Sequence& sequence, const TakeTargets& targets) {
     const double reach_s = 0.5 * double(sequence.cycle_ticks()) / double(tick_hz);
@@ -192,7 +202,9 @@ Result<int> run(const Options& options) {
     if (!calibration.ok()) return calibration.error();
     const auto targets = targets_of(options, *sequence);
     if (!targets.ok()) return targets.error();
+    say_exact_rate(options, *sequence, *targets);
     warn_of_long_cycles(*sequence, *targets);
+    warn_of_flicker(*sequence);
     auto account = open_account(options);
     if (!account.ok()) return account.error();
     auto archive = ArchiveWriter::create_beside(options.output, take_info(options, *sequence, *stage, *targets),

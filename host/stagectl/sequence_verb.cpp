@@ -7,6 +7,8 @@
 
 #include "program.hpp"
 #include "stage/flicker.hpp"
+#include "stagectl/flicker_warning.hpp"
+#include "stagectl/lost_slots.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -26,10 +28,7 @@ struct Summary {
     double cycle_us = 0, seconds = 0;
     size_t program_bytes = 0;
     Flicker flicker;
-    size_t slowest_lamp = 0;  // the one with the lowest strobe rate
-
-    bool whole_is_dangerous() const { return flicker.whole.modulation > photosensitive_modulation; }
-    bool lamp_is_dangerous() const { return flicker.worst_lamp.modulation > photosensitive_modulation; }
+    int slowest_lamp = -1;  // of the lamps that are lit, the one with the lowest strobe rate
 };
 
 Summary summarize(const Sequence& sequence, const StageConfig& stage) {
@@ -40,9 +39,11 @@ Summary summarize(const Sequence& sequence, const StageConfig& stage) {
     summary.program_bytes = encode_program(sequence, stage).size();
     summary.flicker = measure_flicker(sequence);
     const auto& lamps = summary.flicker.lamps;
-    const auto slowest = std::min_element(
-        lamps.begin(), lamps.end(), [](const LampLight& a, const LampLight& b) { return a.strobe_hz < b.strobe_hz; });
-    summary.slowest_lamp = size_t(slowest - lamps.begin());
+    for (size_t lamp = 0; lamp < lamps.size(); ++lamp) {
+        if (lamps[lamp].duty == 0) continue;
+        const int slowest = summary.slowest_lamp;
+        if (slowest < 0 || lamps[lamp].strobe_hz < lamps[size_t(slowest)].strobe_hz) summary.slowest_lamp = int(lamp);
+    }
     return summary;
 }
 
@@ -73,6 +74,7 @@ nlohmann::json to_json(const Summary& summary, const Sequence& sequence) {
                          {"scale", slot.scale},
                          {"trigger_mask", slot.trigger_mask}});
     const auto peak = [](const FlickerPeak& p) { return nlohmann::json{{"hz", p.hz}, {"modulation", p.modulation}}; };
+    const int worst = summary.flicker.worst_lamp_index;
     return {{"basis", sequence.basis.name},
             {"cycles", sequence.config.cycles},
             {"cycle_us", summary.cycle_us},
@@ -82,8 +84,9 @@ nlohmann::json to_json(const Summary& summary, const Sequence& sequence) {
             {"light_duty", summary.flicker.light_duty},
             {"flicker_whole", peak(summary.flicker.whole)},
             {"flicker_worst_lamp", peak(summary.flicker.worst_lamp)},
-            {"worst_lamp", summary.flicker.worst_lamp_index},
-            {"photosensitivity_warning", summary.whole_is_dangerous() || summary.lamp_is_dangerous()},
+            {"worst_lamp", worst < 0 ? nlohmann::json() : nlohmann::json(worst)},
+            {"photosensitivity_warning", !flicker_warning(summary.flicker).empty()},
+            {"lost_slots", sequence.is_capture() ? lost_slots_json(sequence) : nlohmann::json()},
             {"lamps", lamps},
             {"slots", slots}};
 }
@@ -99,33 +102,40 @@ void print_slots(const Sequence& sequence) {
     }
 }
 
+void print_light(const Flicker& flicker, int slowest_lamp) {
+    if (slowest_lamp < 0) {
+        fmt::print("no lamp is lit\n");
+        return;
+    }
+    const LampLight& slowest = flicker.lamps[size_t(slowest_lamp)];
+    fmt::print(
+        "light is on {:.1f} % of the time; of the lamps that are lit, lamp {} flashes least, {:.1f} times a second, "
+        "lit "
+        "{:.3f} % of the time, dark for up to {:.1f} ms\n",
+        flicker.light_duty * 100, slowest_lamp, slowest.strobe_hz, slowest.duty * 100, slowest.longest_dark_us * 1e-3);
+    fmt::print("flicker from {} to {} Hz: ", photosensitive_min_hz, photosensitive_max_hz);
+    if (flicker.worst_lamp_index < 0)
+        fmt::print("none\n");
+    else
+        fmt::print("{:.1f} % of all light at {:.1f} Hz; {:.0f} % of lamp {} at {:.1f} Hz\n",
+                   flicker.whole.modulation * 100, flicker.whole.hz, flicker.worst_lamp.modulation * 100,
+                   flicker.worst_lamp_index, flicker.worst_lamp.hz);
+    if (const std::string warning = flicker_warning(flicker); !warning.empty()) fmt::print("{}\n", warning);
+}
+
 void print_summary(const Summary& summary, const Sequence& sequence) {
-    const LampLight& slowest = summary.flicker.lamps[summary.slowest_lamp];
     fmt::print("{} slots a cycle: {} of basis {}, {} tracking, {} matte, {} dark\n", sequence.slots.size(),
                summary.kinds[size_t(SlotKind::basis)], sequence.basis.name, summary.kinds[size_t(SlotKind::tracking)],
                summary.kinds[size_t(SlotKind::matte)], summary.kinds[size_t(SlotKind::dark)]);
-    if (sequence.is_capture())
+    if (sequence.is_capture()) {
         fmt::print("optical code: the order of tracking, matte and dark slots is unique over the cycle\n");
-    fmt::print("cycle {:.3f} ms, {} cycles {:.3f} s; program of {} bytes\n", summary.cycle_us * 1e-3,
-               sequence.config.cycles, summary.seconds, summary.program_bytes);
-    fmt::print(
-        "light is on {:.1f} % of the time; lamp {} flashes least, {:.1f} times a second, lit {:.3f} % of the "
-        "time, dark for up to {:.1f} ms\n",
-        summary.flicker.light_duty * 100, summary.slowest_lamp, slowest.strobe_hz, slowest.duty * 100,
-        slowest.longest_dark_us * 1e-3);
-    fmt::print("flicker from {} to {} Hz: {:.1f} % of all light at {:.1f} Hz; {:.0f} % of lamp {} at {:.1f} Hz\n",
-               photosensitive_min_hz, photosensitive_max_hz, summary.flicker.whole.modulation * 100,
-               summary.flicker.whole.hz, summary.flicker.worst_lamp.modulation * 100, summary.flicker.worst_lamp_index,
-               summary.flicker.worst_lamp.hz);
-    if (summary.whole_is_dangerous())
-        fmt::print(
-            "WARNING: the light as a whole flickers by more than {:.0f} % at a rate that can trigger seizures. "
-            "Warn everyone in the room.\n",
-            photosensitive_modulation * 100);
-    else if (summary.lamp_is_dangerous())
-        fmt::print(
-            "WARNING: whoever looks straight at a lamp sees it flicker at a rate that can trigger seizures. "
-            "Warn everyone in the room.\n");
+        fmt::print("lost slots: {}\n", describe_lost_slots(sequence));
+    }
+    fmt::print("cycle {:.3f} ms, {} cycles {:.3f} s{}; program of {} bytes\n", summary.cycle_us * 1e-3,
+               sequence.config.cycles, summary.seconds,
+               sequence.config.playback.start == StartSource::photo ? " and what each waits for its edge" : "",
+               summary.program_bytes);
+    print_light(summary.flicker, summary.slowest_lamp);
 }
 
 Result<int> run(const Options& options) {

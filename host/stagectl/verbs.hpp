@@ -13,6 +13,7 @@ void add_status_verb(CLI::App& app, int& exit_code);
 void add_sequence_verb(CLI::App& app, int& exit_code);
 void add_basis_verb(CLI::App& app, int& exit_code);
 void add_basis_design_verb(CLI::App& basis, int& exit_code);
+void add_basis_export_verb(CLI::App& basis, int& exit_code);
 void add_basis_report_verb(CLI::App& basis, int& exit_code);
 void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_grey_verb(CLI::App& app, int& exit_code);

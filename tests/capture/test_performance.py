@@ -22,7 +22,8 @@ def record(folder, scene, *options, faults=(), code=0):
     inject = ["--inject", folder / "faults.toml"] if faults else []
     archive = folder / "take.rfa"
     with VirtualStage(folder / "work", scene, *inject) as stage:
-        stage.stagectl("run", "--sequence", sequence("single"), "--nominal", "--cycles", CYCLES, "-o", archive, *options, code=code)
+        said = stage.stagectl("run", "--sequence", sequence("single"), "--nominal", "--cycles", CYCLES, "-o", archive, *options, code=code)
+        (folder / "said.txt").write_text(said)
         # The truth needs the stage's camera.
         (folder / "stage.toml").write_text(stage.stage.read_text())
     return archive
@@ -75,6 +76,15 @@ def test_targets_stand_at_every_fifth_tracking_frame_that_a_whole_basis_lies_aro
         motion = manifest(still[name])["extra"]["motion"]
         assert motion["quality"] == name and motion["tracking_frames_a_target"] == 5
         assert verify(still[name]).returncode == 0
+
+
+def test_the_operator_is_warned_of_flicker_and_told_the_exact_rate_that_the_archive_has(still):
+    said = (still["preview"].parent / "said.txt").read_text()
+    assert "can trigger seizures" in said
+    rate_hz = 125e6 / (57870 * 18 * 5)
+    assert f"--fps 24 is {rate_hz:.7g} targets a second here" in said
+    assert manifest(still["preview"])["frame_rate_hz"] == pytest.approx(rate_hz, rel=1e-12)
+    assert "can trigger seizures" in (still["cycles"].parent / "said.txt").read_text()
 
 
 @pytest.mark.parametrize("name", ["none", "preview", "standard"])

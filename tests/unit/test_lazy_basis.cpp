@@ -196,10 +196,36 @@ TEST(LazyBasis, has_targets_at_whole_parts_of_the_tracking_rate) {
     const auto refused = tracking_frames_a_target(sequence, 25);
     ASSERT_FALSE(refused.ok());
     EXPECT_NE(refused.error().message.find("24"), std::string::npos) << "it says which rates there are";
+    // Groups of 18 slots: 4 or 5 tracking frames to a target of 25 a second.
+    EXPECT_NE(refused.error().message.find("frame_rate_hz = 1800, or 2250"), std::string::npos)
+        << refused.error().message;
     Sequence without = sequence;
     std::erase_if(without.slots, [](const Slot& slot) { return slot.kind == SlotKind::tracking; });
     EXPECT_FALSE(tracking_frames_a_target(without, 24).ok());
     EXPECT_TRUE(target_numbers(without, 1).empty());
+}
+
+TEST(LazyBasis, has_the_targets_asked_for_at_each_frame_rate_that_a_refusal_names) {
+    for (const double frame_rate_hz : {1800.0, 2250.0}) {
+        SequenceConfig config;
+        config.frame_rate_hz = frame_rate_hz;
+        const auto sequence = compile_sequence(config, default_stage());
+        ASSERT_TRUE(sequence.ok());
+        const auto every = tracking_frames_a_target(*sequence, 25);
+        ASSERT_TRUE(every.ok()) << every.error().message;
+        EXPECT_NEAR(target_rate_hz(*sequence, *every), 25, 1e-3);
+    }
+}
+
+TEST(LazyBasis, tells_24_targets_a_second_from_24_that_are_23_976) {
+    SequenceConfig config;
+    config.frame_rate_hz = 2157.84;  // 5 * 18 * 23.976
+    const auto sequence = compile_sequence(config, default_stage());
+    ASSERT_TRUE(sequence.ok());
+    const auto every = tracking_frames_a_target(*sequence, 24);
+    ASSERT_TRUE(every.ok()) << every.error().message;
+    // 90 periods of round(125e6 / 2157.84) = 57928 ticks.
+    EXPECT_NEAR(target_rate_hz(*sequence, *every), 125e6 / (90 * 57928.0), 1e-9);
 }
 
 TEST(LazyBasis, splits_the_time_between_targets_as_evenly_as_whole_frames_allow) {

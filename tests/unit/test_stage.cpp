@@ -80,8 +80,9 @@ TEST_F(StageFile, a_mistake_is_named_with_file_line_and_key) {
         EXPECT_NE(message.find(what), std::string::npos) << message;
     };
     expect("[lamps]\nradius_m = -1\n", "2", "lamps.radius_m must be a number");
-    expect("[lamps]\nradius = 1\n", "2", "lamps.radius is not a key");
-    expect("[[camera]]\n[[camera]]\nwidth = 64\nheigth = 48\n", "4", "camera.heigth is not a key");
+    expect("[lamps]\nradius = 1\n", "2", "lamps.radius is not a key that is known here; did you mean radius_m?");
+    expect("[[camera]]\n[[camera]]\nwidth = 64\nheigth = 48\n", "4",
+           "camera.heigth is not a key that is known here; did you mean height?");
     expect("[[camera]]\nwidth = 64.5\n", "2", "camera.width must be a whole number");
     expect("[[camera]]\ncfa = \"bayer\"\n", "2", "none of: bggr");
     expect("[camera]\nwidth = 64\n", "1", "write [[camera]]");

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// The projector on the residuals by Eigen's complete orthogonal decomposition, and small sets of rows by Cholesky's.
+#include "stage/row_losses.hpp"
+
+#include <Eigen/QR>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "stage/basis_inverse.hpp"
+
+namespace ols {
+
+namespace {
+
+// A pivot below this, of a projector whose largest entry is about d / rows: rounding.
+constexpr double pivot_least = 1e-9;
+
+using Decomposition = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>;
+
+Decomposition decompose(const Basis& basis) {
+    Eigen::MatrixXd light(basis.rows, basis.lamps);
+    for (int row = 0; row < basis.rows; ++row)
+        for (int lamp = 0; lamp < basis.lamps; ++lamp) light(row, lamp) = basis.light(row, lamp);
+    Decomposition decomposition;
+    decomposition.setThreshold(rank_tolerance);
+    return decomposition.compute(light);
+}
+
+RowResidual residual_of(const Decomposition& decomposition) {
+    const int redundancy = int(decomposition.rows() - decomposition.rank());
+    const Eigen::MatrixXd unexplained =
+        Eigen::MatrixXd(decomposition.householderQ()).rightCols(redundancy);  // orthonormal, the left null space of P
+    return {unexplained * unexplained.transpose(), redundancy};
+}
+
+RowResidual no_residual(const Basis& basis) {
+    return {Eigen::MatrixXd::Zero(basis.rows, basis.rows), 0};
+}
+
+}  // namespace
+
+bool is_one_image_a_row(const Basis& basis) {
+    for (int row = 0; row < basis.rows; ++row)
+        for (int image = 0; image < basis.images(); ++image)
+            if ((basis.inverse(row, image) != 0) != (row == image)) return false;
+    return true;
+}
+
+RowResidual row_residual(const Basis& basis) {
+    return is_one_image_a_row(basis) ? no_residual(basis) : residual_of(decompose(basis));
+}
+
+RowLosses::RowLosses(const Basis& basis) : residual_(no_residual(basis)) {
+    if (is_one_image_a_row(basis)) return;
+    const Decomposition decomposition = decompose(basis);
+    residual_ = residual_of(decomposition);
+    if (residual_.redundancy == 0) return;
+    const Eigen::MatrixXd inverse = decomposition.pseudoInverse();
+    spread_ = inverse.transpose() * inverse / inverse.squaredNorm();
+}
+
+double RowLosses::noise_gain(std::span<const int> rows) const {
+    assert(rows.size() <= rows_max);
+    if (int(rows.size()) > redundancy()) return std::numeric_limits<double>::infinity();
+    double lower[rows_max][rows_max] = {}, inverse[rows_max][rows_max] = {};  // (I - H)_MM = lower lower'
+    double gain = 1;
+    for (size_t i = 0; i < rows.size(); ++i) {
+        for (size_t j = 0; j <= i; ++j) {
+            double left = residual_.projector(rows[i], rows[j]);
+            for (size_t k = 0; k < j; ++k) left -= lower[i][k] * lower[j][k];
+            if (i == j && left < pivot_least) return std::numeric_limits<double>::infinity();
+            lower[i][j] = i == j ? std::sqrt(left) : left / lower[j][j];
+        }
+        for (size_t j = 0; j <= i; ++j) {
+            double left = i == j;
+            for (size_t k = j; k < i; ++k) left -= lower[i][k] * inverse[k][j];
+            inverse[i][j] = left / lower[i][i];
+        }
+        for (size_t j = 0; j <= i; ++j)
+            for (size_t k = 0; k <= i; ++k) gain += inverse[i][j] * inverse[i][k] * spread_(rows[j], rows[k]);
+    }
+    return gain;
+}
+
+std::vector<int> RowLosses::classes() const {
+    std::vector<int> class_of(size_t(rows()), -1), first_rows;
+    for (int row = 0; row < rows(); ++row) {
+        if (!makes_up_for(std::array{row})) continue;
+        size_t c = 0;
+        while (c < first_rows.size() && makes_up_for(std::array{first_rows[c], row})) ++c;
+        if (c == first_rows.size()) first_rows.push_back(row);
+        class_of[size_t(row)] = int(c);
+    }
+    return class_of;
+}
+
+}  // namespace ols
