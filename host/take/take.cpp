@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "develop/frame_store.hpp"
+#include "record/camera_record.hpp"
 #include "record/event_queue.hpp"
 #include "record/missing_ranges.hpp"
 
@@ -28,6 +29,7 @@ double seconds_since(Clock::time_point start) {
 struct Job {
     uint32_t index = 0;
     std::variant<CycleFrames, TargetFrames> frames;
+    std::string lost_by;  // why the first of its slots that is missing is; "" when none is
 };
 
 // A target, or why there is none.
@@ -147,7 +149,7 @@ class TakeWriter {
         for (; next_ < plan_.entries.size() && plan_.entries[next_].frames.last < decided; ++next_) {
             const Plan::Entry& entry = plan_.entries[next_];
             const auto index = uint32_t(next_);
-            Job job{index, {}};
+            Job job{index, {}, missing_.cause_within(entry.frames.first, entry.frames.last)};
             if (is_performance_)
                 job.frames = store_.around(index, entry.target);
             else
@@ -187,6 +189,7 @@ class TakeWriter {
                 describe(*outcome.target, job->index, outcome.detail);
             } else {
                 outcome.why = target.error().message;
+                if (!job->lost_by.empty()) outcome.why += "; the first was lost because: " + job->lost_by;
             }
             job.reset();  // its memory takes the camera's next frames
             report_.seconds_develop += seconds_since(start);
@@ -313,7 +316,9 @@ Result<TakeReport> run_take(Board& board, Camera& camera, const Sequence& sequen
                                {"duplicates", record->duplicates},
                                {"camera_restarts", record->camera_restarts},
                                {"clock_drift_ppm", record->clock_drift_ppm},
-                               {"board_end", record->board_end}}}});
+                               {"board_end", record->board_end},
+                               {"camera_end", record->camera_end},
+                               {"camera", camera_record(record->camera, record->camera_counts)}}}});
     const Status finished = archive.finish();
     if (!finished.ok() && report.write_error.empty()) report.write_error = finished.error().message;
     report.seconds_total = seconds_since(start);
