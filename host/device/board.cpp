@@ -17,6 +17,8 @@ constexpr uint32_t reply_timeout_us = 1'000'000;
 // Of 22 bytes each: two packets. The board takes in one and keeps another while it waits for somebody to read its first
 // reply; a third would not be taken, and the write not end.
 constexpr uint32_t log_messages_at_once = 4;
+// Reads in which a reply must have come: it is one frame, a byte a read at worst, behind those to a few requests given up.
+constexpr int reads_a_reply = 10 * OLS_FRAME_BYTES_MAX;
 constexpr size_t packet_bytes = 64;  // full-speed bulk: a read must hold whole packets
 constexpr size_t read_bytes = (OLS_FRAME_BYTES_MAX + packet_bytes - 1) / packet_bytes * packet_bytes;
 
@@ -148,7 +150,7 @@ uint16_t Board::add_request(uint16_t type, std::span<const uint8_t> payload, std
 }
 
 Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id) {
-    for (;;) {
+    for (int reads = 0; reads < reads_a_reply;) {
         ols_frame reply;
         while (ols_frame_parser_read(parser_.get(), &reply)) {
             // A reply to a request that was given up earlier is nobody's any more.
@@ -161,10 +163,12 @@ Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t reque
             auto bytes = transfer_->read(read_bytes, reply_timeout_us);
             if (!bytes.ok()) return bytes.error();
             received_ = std::move(*bytes);
+            ++reads;
         }
         const size_t taken = ols_frame_parser_write(parser_.get(), received_.data(), received_.size());
         received_.erase(received_.begin(), received_.begin() + ptrdiff_t(taken));
     }
+    return fail("the board sends, but not the answer to what it was asked: reset it and start over");
 }
 
 Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {

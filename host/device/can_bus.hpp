@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "device/unix_socket.hpp"
 #include "result.hpp"
 
 namespace ols {
@@ -29,7 +30,7 @@ class CanBus {
 // A SocketCAN interface, as in `ip link`: "can0". Only frames with `id` are received.
 Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id);
 
-// The emulated bus (docs/architecture.md, "CAN frames over a socket").
-Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path);
+// The emulated bus (docs/architecture.md, "CAN frames over a socket"), given up after so long without a word.
+Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, int patience_ms = UnixSocket::patience_ms);
 
 }  // namespace ols

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The emulated CAN bus, frames over an AF_UNIX stream socket (docs/architecture.md, "CAN frames over a socket").
-#include <unistd.h>
-
-#include <cerrno>
 #include <cstring>
 
 #include "device/can_bus.hpp"
@@ -17,25 +14,22 @@ constexpr uint64_t ticks_per_us = 125;
 
 class CanSocket : public CanBus {
   public:
-    CanSocket(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
-    ~CanSocket() override { ::close(fd_); }
+    explicit CanSocket(UnixSocket socket) : socket_(std::move(socket)) {}
 
     // Waits until the board has told its time.
     Status begin() {
         for (can_frame record;;) {
-            if (const Status got = receive_record(&record); !got.ok()) return got;
+            if (const Status got = socket_.receive(&record, sizeof record); !got.ok()) return got;
             if (take_time(record)) return Done{};
         }
     }
 
-    Status send(const can_frame& frame) override {
-        return send_whole(fd_, &frame, sizeof frame) ? Status(Done{}) : Status(lost());
-    }
+    Status send(const can_frame& frame) override { return socket_.send(&frame, sizeof frame); }
 
     Result<std::optional<can_frame>> receive(uint64_t until_us) override {
         do {
             can_frame record;
-            if (const Status got = receive_record(&record); !got.ok()) return got.error();
+            if (const Status got = socket_.receive(&record, sizeof record); !got.ok()) return got.error();
             if (!take_time(record)) return std::optional(record);
         } while (now_us_ < until_us);
         return std::optional<can_frame>();
@@ -52,23 +46,16 @@ class CanSocket : public CanBus {
         return true;
     }
 
-    Status receive_record(can_frame* record) {
-        return receive_whole(fd_, record, sizeof *record) ? Status(Done{}) : Status(lost());
-    }
-
-    Error lost() const { return fail("the CAN bus at '" + path_ + "' is gone: start the stage again"); }
-
-    int fd_;
-    std::string path_;
+    UnixSocket socket_;
     uint64_t now_us_ = 0;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path) {
-    const auto fd = connect_unix(path, "the CAN bus");
-    if (!fd.ok()) return fd.error();
-    auto bus = std::make_unique<CanSocket>(*fd, path);
+Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, int patience_ms) {
+    auto socket = UnixSocket::connect(path, "the CAN bus", patience_ms);
+    if (!socket.ok()) return socket.error();
+    auto bus = std::make_unique<CanSocket>(std::move(*socket));
     if (const Status begun = bus->begin(); !begun.ok()) return begun.error();
     return std::unique_ptr<CanBus>(std::move(bus));
 }

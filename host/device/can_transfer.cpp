@@ -48,8 +48,8 @@ class CanTransfer : public Transfer {
         if (!isotp_send(&isotp_, bytes.data(), uint16_t(bytes.size()), begin_us))
             return fail(fmt::format("a message of {} bytes does not fit ISO-TP", bytes.size()));
         while (isotp_is_sending(&isotp_)) {
-            if (const Status stepped = step(deadline(begin_us, timeout_us)); !stepped.ok()) return stepped;
-            if (timeout_us && bus_->now_us() - begin_us >= timeout_us && isotp_is_sending(&isotp_))
+            if (const Status stepped = step(begin_us + timeout_us); !stepped.ok()) return stepped;
+            if (bus_->now_us() - begin_us >= timeout_us && isotp_is_sending(&isotp_))
                 return fail("the board did not take the message in time: reset it and start over");
         }
         if (lost_sending() != errors) return fail(error_text(isotp_.last_error));
@@ -60,9 +60,9 @@ class CanTransfer : public Transfer {
         const uint64_t begin_us = bus_->now_us();
         while (isotp_message_bytes(&isotp_) == 0) {
             const uint64_t errors = lost_receiving();
-            if (const Status stepped = step(deadline(begin_us, timeout_us)); !stepped.ok()) return stepped.error();
+            if (const Status stepped = step(begin_us + timeout_us); !stepped.ok()) return stepped.error();
             if (lost_receiving() != errors) return fail(error_text(isotp_.last_error));
-            if (timeout_us && bus_->now_us() - begin_us >= timeout_us && isotp_message_bytes(&isotp_) == 0)
+            if (bus_->now_us() - begin_us >= timeout_us && isotp_message_bytes(&isotp_) == 0)
                 return fail("the board did not answer in time: reset it and start over");
         }
         const size_t count = std::min(capacity, size_t(isotp_message_bytes(&isotp_) - taken_));
@@ -76,10 +76,6 @@ class CanTransfer : public Transfer {
     }
 
   private:
-    static uint64_t deadline(uint64_t begin_us, uint32_t timeout_us) {
-        return timeout_us ? begin_us + timeout_us : UINT64_MAX;
-    }
-
     uint64_t lost_sending() const {
         return isotp_.errors[ISOTP_TIMEOUT_A] + isotp_.errors[ISOTP_TIMEOUT_BS] + isotp_.errors[ISOTP_INVALID_FS] +
                isotp_.errors[ISOTP_WAIT_OVERRUN] + isotp_.errors[ISOTP_BUFFER_OVERFLOW];

@@ -5,6 +5,10 @@
 // and its samples. `head` counts frames written, `tail` frames released by the reader; both only grow, and record n
 // lies at n % slots. The writer waits while head - tail == slots (--pace virtual) or drops the frame and counts it
 // (--pace wall).
+//
+// Each end holds a lock on a byte of the file for as long as its process lives, so that the other knows when it has gone,
+// however it went. Frames are for a reader that has started the camera: it asks for a start, the writer answers with the
+// camera's time, and until then nothing goes in.
 #pragma once
 
 #include <atomic>
@@ -18,19 +22,41 @@
 
 namespace ols {
 
-constexpr uint64_t ring_magic = 0x31474e4952534c4f;  // "OLSRING1", little-endian
+constexpr uint64_t ring_magic = 0x32474e4952534c4f;  // "OLSRING2", little-endian
+
+// What the frames are, as the writer's camera is set up; a frame that failed to be may come smaller.
+struct RingContent {
+    uint32_t width = 0, height = 0;
+    PixelFormat format = PixelFormat::u16;
+    Cfa cfa = Cfa::none;
+    uint32_t bits = 0;  // of a sample of u16
+    uint32_t reserved = 0;
+
+    uint64_t frame_bytes() const {
+        const uint64_t sample_bytes = format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+        return uint64_t(width) * height * uint64_t(samples_per_pixel(cfa)) * sample_bytes;
+    }
+};
 
 struct RingHeader {
     uint64_t magic;
     uint32_t slots;   // records
     uint32_t stride;  // bytes a record, RingFrame included, rounded up to 64
+    RingContent content;
+    // The writer's.
     alignas(64) std::atomic<uint64_t> head;
     std::atomic<uint64_t> watermark_ns;  // camera time before which every frame was written
     std::atomic<uint64_t> dropped;       // frames the writer could not place (wall pace)
-    std::atomic<uint32_t> head_futex;    // changes with head, watermark and closed
+    std::atomic<uint32_t> head_futex;    // changes with everything else that the writer changes
     std::atomic<uint32_t> closed;        // 1: no more frames will come
+    std::atomic<uint32_t> started;       // the start that was answered last
+    std::atomic<uint64_t> started_ns;    // the camera's time at it
+    std::atomic<uint64_t> started_head;  // head at it: the records before are nobody's
+    // The reader's.
     alignas(64) std::atomic<uint64_t> tail;
-    std::atomic<uint32_t> tail_futex;
+    std::atomic<uint32_t> tail_futex;  // changes with everything else that the reader changes
+    std::atomic<uint32_t> asked;       // counts the starts asked for
+    std::atomic<uint32_t> running;     // 1 from a start to its stop
 };
 
 struct RingFrame {
@@ -43,14 +69,30 @@ struct RingFrame {
     uint64_t bytes;  // samples that follow
 };
 
+struct RingMapping;
+
+// For one thread.
 class RingWriter {
   public:
-    // Makes the file (replacing an older one). `frame_bytes` is the largest frame.
-    static Result<RingWriter> create(const std::string& path, uint32_t slots, uint64_t frame_bytes);
+    // Makes the file (replacing an older one).
+    static Result<RingWriter> create(const std::string& path, uint32_t slots, const RingContent& content);
 
-    // Copies one frame in; false when the ring is full and `wait` is off (the frame is counted as dropped).
-    // With `wait`, returns false only when `cancelled` becomes true.
-    bool write(const Frame& frame, bool wait, const std::atomic<bool>& cancelled);
+    // A start that the reader waits for. Answer with the camera's time once every earlier exposure is behind: written, or
+    // never to be.
+    std::optional<uint32_t> start_asked() const;
+    void confirm_start(uint32_t start, uint64_t camera_time_ns);
+
+    // Whether frames are for somebody: a reader lives, has started the camera and not stopped it.
+    bool wanted() const;
+
+    enum class Outcome {
+        written,
+        full,      // there was no room and `wait` was off; counted as dropped
+        unwanted,  // nobody wants it, or not any more
+        cancelled
+    };
+    // Copies one frame in. With `wait`, waits for room as long as the frame is wanted and `cancelled` is false.
+    Outcome write(const Frame& frame, bool wait, const std::atomic<bool>& cancelled);
     void set_watermark(uint64_t camera_time_ns);
     void close();
 
@@ -59,31 +101,43 @@ class RingWriter {
     ~RingWriter();
 
   private:
-    struct Mapping;
-    explicit RingWriter(std::unique_ptr<Mapping>);
-    std::unique_ptr<Mapping> mapping_;
+    explicit RingWriter(std::unique_ptr<RingMapping>);
+    std::unique_ptr<RingMapping> mapping_;
 };
 
+// start() and read() from one thread at a time, the rest from any.
 class RingReader {
   public:
-    // Opens an existing ring; the error says to start the camera first when the file is not there.
+    // Opens an existing ring, as its only reader; the error says to start the camera first when the file is not there or its
+    // writer is not, or that another program reads it.
     static Result<RingReader> open(const std::string& path);
+
+    const RingContent& content() const;
+    uint32_t slots() const;
+
+    // Has the camera started; what lies in the ring from before is let go of. Returns the camera's time. Fails when the
+    // writer goes, or does nothing at all for `patience_ms`.
+    Result<uint64_t> start(int patience_ms);
+    void stop();
 
     // The next frame, copied out, or nothing when none came within `timeout_ms` (a pause for the caller to look at
     // its stop flag; nothing else is decided by it).
     std::optional<Frame> read(int timeout_ms);
     uint64_t watermark_ns() const;
     uint64_t dropped() const;
-    bool closed() const;  // the writer has closed and every frame was read
+
+    enum class Writer { live, closed, gone };
+    // `live` also while frames are to be read; `gone` when its process ended without closing the ring.
+    Writer writer() const;
 
     RingReader(RingReader&&) noexcept;
     RingReader& operator=(RingReader&&) noexcept;
     ~RingReader();
 
   private:
-    struct Mapping;
-    explicit RingReader(std::unique_ptr<Mapping>);
-    std::unique_ptr<Mapping> mapping_;
+    explicit RingReader(std::unique_ptr<RingMapping>);
+    bool has_frames() const;  // to be read
+    std::unique_ptr<RingMapping> mapping_;
 };
 
 }  // namespace ols

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A camera whose frames another process writes into a shared-memory ring.
-#include "device/camera.hpp"
+// Camera over RingReader. The program that fills the ring has set its camera up; here that is only checked.
+#include "device/ring_camera.hpp"
+
+#include "device/delivery_count.hpp"
 #include "device/ring.hpp"
 
 namespace ols {
@@ -9,25 +11,73 @@ namespace {
 
 class RingCamera : public Camera {
   public:
-    explicit RingCamera(RingReader ring) : ring_(std::move(ring)) {}
+    RingCamera(RingReader ring, std::string path, uint32_t index)
+        : ring_(std::move(ring)), path_(std::move(path)), index_(index) {}
 
-    std::optional<Frame> read(int timeout_ms) override { return ring_.read(timeout_ms); }
+    CameraInfo info() const override { return {"ring:" + path_, link_text(), in_force_, 1}; }
+
+    Status set_up(const CameraSetup& wanted) override {
+        const RingContent& content = ring_.content();
+        in_force_ = {};
+        in_force_.width = int(content.width);
+        in_force_.height = int(content.height);
+        in_force_.cfa = content.cfa;
+        in_force_.bits = content.format == PixelFormat::u16 ? int(content.bits) : wanted.bits;  // floats have all
+        return check_setup("the camera at ring:" + path_, wanted, in_force_,
+                           {"trigger_source", "trigger_activation", "trigger_delay_us", "exposure_mode"});
+    }
+
+    Result<uint64_t> start() override {
+        const auto started_ns = ring_.start(device_patience_ms);
+        if (started_ns.ok()) delivery_.start(*started_ns);
+        return started_ns;
+    }
+    void stop() override { ring_.stop(); }
+
+    std::optional<Frame> read(int timeout_ms) override {
+        while (auto frame = ring_.read(timeout_ms)) {
+            if (!delivery_.take(frame->stamp)) continue;
+            frame->camera = index_;
+            return frame;
+        }
+        return std::nullopt;
+    }
+
     uint64_t watermark_ns() const override { return ring_.watermark_ns(); }
-    uint64_t dropped() const override { return ring_.dropped(); }
-    bool closed() const override { return ring_.closed(); }
+
+    CameraCounts counts() const override {
+        CameraCounts counts = delivery_.counts();
+        counts.dropped = ring_.dropped();
+        return counts;
+    }
+
+    CameraState state() const override {
+        switch (ring_.writer()) {
+            case RingReader::Writer::live: return {};
+            case RingReader::Writer::closed:
+                return {CameraState::ended, "the program that fills " + path_ + " has ended"};
+            case RingReader::Writer::gone: break;
+        }
+        return {CameraState::gone,
+                "the camera is gone: the program that fills " + path_ + " ended without a word; start it again"};
+    }
 
   private:
+    std::string link_text() const { return "shared-memory ring of " + std::to_string(ring_.slots()) + " frames"; }
+
     RingReader ring_;
+    const std::string path_;
+    const uint32_t index_;
+    CameraSetup in_force_;
+    DeliveryCount delivery_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<Camera>> open_camera(const std::string& source) {
-    constexpr std::string_view ring_scheme = "ring:";
-    if (!source.starts_with(ring_scheme)) return fail("'" + source + "' is no camera: write ring:PATH");
-    auto ring = RingReader::open(source.substr(ring_scheme.size()));
+Result<std::unique_ptr<Camera>> open_ring_camera(const std::string& path, uint32_t index) {
+    auto ring = RingReader::open(path);
     if (!ring.ok()) return ring.error();
-    return std::unique_ptr<Camera>(std::make_unique<RingCamera>(std::move(*ring)));
+    return std::unique_ptr<Camera>(std::make_unique<RingCamera>(std::move(*ring), path, index));
 }
 
 }  // namespace ols

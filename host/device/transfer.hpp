@@ -8,12 +8,13 @@
 #include <string>
 #include <vector>
 
+#include "device/unix_socket.hpp"
 #include "result.hpp"
 
 namespace ols {
 
 // One board's pair of bulk endpoints. Each direction is a byte stream; where a transfer ends means nothing.
-// Timeouts are in the board's time, which on the virtual stage is not the wall's; 0 is none.
+// Every transfer ends: timeouts are more than 0, in the board's time, which on the virtual stage is not the wall's.
 class Transfer {
   public:
     virtual ~Transfer() = default;
@@ -30,7 +31,9 @@ class Transfer {
 // not 0). Errors say what links there are, which boards are plugged in, or how to get permission.
 Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link);
 
-// The emulated board's USB over the AF_UNIX socket at `path` (docs/architecture.md, "USB transfers over a socket").
-Result<std::unique_ptr<Transfer>> open_socket_transfer(const std::string& path);
+// The emulated board's USB over the AF_UNIX socket at `path` (docs/architecture.md, "USB transfers over a socket"). Its time is
+// the board's; a board whose time does not go on is given up after `patience_ms` of the wall's without a word.
+Result<std::unique_ptr<Transfer>> open_socket_transfer(const std::string& path,
+                                                       int patience_ms = UnixSocket::patience_ms);
 
 }  // namespace ols

@@ -21,17 +21,19 @@ class UsbTransfer : public Transfer {
     }
 
     Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) override {
-        // An empty packet ends a message whose last packet was full; it is not what the caller waits for.
-        for (;;) {
+        // An empty packet ends a message whose last packet was full; it is not what the caller waits for. No board sends many.
+        for (int empty_packets = 0; empty_packets < empty_packets_max; ++empty_packets) {
             std::vector<uint8_t> bytes(capacity);
             const UsbResult got = device_->read(bytes, timeout_ms(timeout_us));
             if (got.outcome != UsbOutcome::done) return fail(usb_outcome_text(got.outcome));
             bytes.resize(got.bytes);
             if (!bytes.empty()) return bytes;
         }
+        return fail("the board sends nothing but empty packets: plug it in again");
     }
 
   private:
+    static constexpr int empty_packets_max = 16;
     static uint32_t timeout_ms(uint32_t timeout_us) { return (timeout_us + 999) / 1000; }
 
     std::unique_ptr<UsbDevice> device_;

@@ -33,9 +33,9 @@ void Identifier::end_log(const std::string& why) {
     settle();
 }
 
-void Identifier::end_frames() {
+void Identifier::end_frames(const std::string& why) {
     placer_.end();
-    frames_ended_ = true;
+    frames_ended_ = why;
     settle();
 }
 
@@ -59,6 +59,7 @@ void Identifier::take_placements() {
     for (Placement& placement : placer_.take_placements()) {
         if (placement.accepted) {
             accepted_.push_back({*placement.arrival, *placement.counter});
+            frames_until_ = *placement.counter + 1;
             continue;
         }
         if (placement.counter && *placement.counter >= decided_) {
@@ -66,6 +67,7 @@ void Identifier::take_placements() {
             slot.why = placement.why;
             slot.camera = placement.arrival.has_value();
             slot.optical = placement.optical;
+            if (placement.arrival) frames_until_ = std::max(frames_until_, *placement.counter + 1);
         }
         if (placement.arrival)
             verdicts_.push_back({Verdict::discarded, *placement.arrival, {}, {}, std::move(placement.why)});
@@ -112,7 +114,8 @@ void Identifier::decide() {
             slot.board = log_.contains(decided_);
             if (slot.why.empty()) {
                 const bool fired = slot.board || !log_ended_ || log_ended_->empty();
-                slot.why = fired ? "no frame came" : *log_ended_;
+                const bool camera_went = frames_ended_ && !frames_ended_->empty() && decided_ >= frames_until_;
+                slot.why = !fired ? *log_ended_ : camera_went ? *frames_ended_ : "no frame came";
             }
             verdicts_.push_back({Verdict::missing, 0, {}, slot, ""});
         }

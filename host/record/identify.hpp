@@ -46,8 +46,8 @@ class Identifier {
     // No more entries: the board has finished ("") or cannot be heard any more, and why.
     void end_log(const std::string& why);
 
-    // No more frames.
-    void end_frames();
+    // No more frames: the camera has delivered everything ("") or gives no more, and why.
+    void end_frames(const std::string& why = "");
 
     // What was decided since the last call. Frames get one verdict each, and so do triggers: all of them, once both ends
     // are told.
@@ -83,7 +83,8 @@ class Identifier {
     std::map<uint64_t, MissingSlot> notes_;  // what is known of undecided triggers without a frame
     std::map<uint64_t, bool> identified_;    // undecided triggers that have one
     uint64_t decided_ = 0;
-    bool frames_ended_ = false;
+    uint64_t frames_until_ = 0;  // above the last trigger that a frame was found for
+    std::optional<std::string> frames_ended_;
     std::vector<Verdict> verdicts_;
 };
 

@@ -31,6 +31,12 @@ void MissingRanges::add(const MissingSlot& slot) {
     ranges_.push_back({slot, 1});
 }
 
+std::string MissingRanges::cause_within(uint64_t first, uint64_t last) const {
+    for (const Range& range : ranges_)
+        if (range.first.counter <= last && range.first.counter + range.count > first) return range.first.why;
+    return "";
+}
+
 nlohmann::json MissingRanges::to_json() const {
     auto list = nlohmann::json::array();
     for (const Range& range : ranges_) {

@@ -18,9 +18,13 @@ namespace ols {
 namespace {
 
 constexpr int read_pause_ms = 20;
-// After the board's end, looks at a camera that shows no sign of life: 5 s. Only then is the rest given up without the
-// camera's word; a camera that lives says by its watermark when it has delivered everything.
-constexpr int silent_looks_max = 250;
+// After the board's end, looks at a camera that shows no sign of life: a minute. Only then is the rest given up without the
+// camera's word; a camera that lives says by its watermark when it has delivered everything, and one whose program has
+// ended is known at once.
+constexpr int silent_looks_max = Camera::device_patience_ms / read_pause_ms;
+// A camera that has not seen one trigger cannot tell when the last one was due. By its own clock it is given so long after the
+// board's end.
+constexpr uint64_t blind_patience_ns = 10'000'000'000;
 
 IdentifyOptions options_for(const Sequence& sequence, uint64_t camera_ns_at_start = 0) {
     IdentifyOptions options;
@@ -35,10 +39,7 @@ struct FrameNews {
 };
 struct CameraPause {
     uint64_t watermark_ns;  // everything before it has been read
-    bool closed;
-};
-struct LogEnd {
-    std::string why;
+    CameraState state;
 };
 using Event = std::variant<FrameNews, CameraPause, LogNews, LogEnd>;
 
@@ -81,7 +82,8 @@ class CameraReader {
     void read() {
         while (!end_) {
             if (!room_->try_acquire_for(std::chrono::milliseconds(read_pause_ms))) continue;
-            const bool closed = camera_.closed();
+            CameraState state = camera_.state();
+            const bool is_live = state.kind == CameraState::live;
             const uint64_t watermark_ns = camera_.watermark_ns();
             auto frame = camera_.read(read_pause_ms);
             if (frame) {
@@ -89,8 +91,8 @@ class CameraReader {
                 continue;
             }
             room_->release();
-            queue_.push(CameraPause{watermark_ns, closed});
-            if (closed) return;
+            queue_.push(CameraPause{watermark_ns, std::move(state)});
+            if (!is_live) return;
         }
     }
 
@@ -154,18 +156,25 @@ class Recording {
         report_.board_end = end.why;
         identifier_.end_log(end.why);
         log_ended_ = true;
-        if (camera_closed_) finish();
+        log_end_watermark_ns_ = last_watermark_ns_;
+        if (camera_state_.kind != CameraState::live) finish(camera_state_.why);
     }
     void take(CameraPause pause) {
         report_.clock_drift_ppm = identifier_.placer().drift_ppm().value_or(report_.clock_drift_ppm);
         silent_looks_ = pause.watermark_ns == last_watermark_ns_ ? silent_looks_ + 1 : 0;
         last_watermark_ns_ = pause.watermark_ns;
-        camera_closed_ = pause.closed;
+        camera_state_ = std::move(pause.state);
         if (!log_ended_) return;  // the board still tells of triggers whose frames came
-        if (pause.closed || has_delivered_all(pause.watermark_ns) || silent_looks_ > silent_looks_max) finish();
+        if (has_delivered_all(pause.watermark_ns))
+            finish("");
+        else if (camera_state_.kind != CameraState::live)
+            finish(camera_state_.why);
+        else if (silent_looks_ > silent_looks_max)
+            finish("the camera showed no sign of life for a minute: check it, or the program that reads it");
     }
-    void finish() {
-        identifier_.end_frames();
+    void finish(std::string why) {
+        identifier_.end_frames(why);
+        report_.camera_end = std::move(why);
         finished_ = true;
     }
 
@@ -173,7 +182,7 @@ class Recording {
     bool has_delivered_all(uint64_t watermark_ns) const {
         if (fired_ == 0) return true;
         const auto last_ns = identifier_.placer().latest_time_of_ns(fired_ - 1);
-        return last_ns && watermark_ns > *last_ns;
+        return watermark_ns > last_ns.value_or(log_end_watermark_ns_ + blind_patience_ns);
     }
 
     void hand_on() {
@@ -205,9 +214,19 @@ class Recording {
     Identifier identifier_;
     std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
     RecordReport report_;
-    uint64_t fired_ = 0, last_watermark_ns_ = 0;
+    uint64_t fired_ = 0, last_watermark_ns_ = 0, log_end_watermark_ns_ = 0;
     int silent_looks_ = 0;
-    bool log_ended_ = false, camera_closed_ = false, finished_ = false;
+    CameraState camera_state_;
+    bool log_ended_ = false, finished_ = false;
+};
+
+// A camera that delivers, until this goes.
+struct StartedCamera {
+    explicit StartedCamera(Camera& started) : camera(started), time_ns(started.start()) {}
+    ~StartedCamera() { camera.stop(); }
+    StartedCamera(const StartedCamera&) = delete;
+    Camera& camera;
+    const Result<uint64_t> time_ns;
 };
 
 }  // namespace
@@ -239,24 +258,32 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
 Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
                                  std::optional<double> black_counts, const RecordSink& sink,
                                  const std::atomic<bool>& stop) {
-    while (camera.read(0)) {
-    }  // frames of an earlier take
-    const uint64_t dropped_before = camera.dropped(), camera_ns_at_start = camera.watermark_ns();
+    const CameraConfig& config = stage.cameras[0];
+    if (const Status status = camera.set_up(config); !status.ok()) return status.error();
+    const CameraCounts counts_before = camera.counts();
+    const StartedCamera started(camera);
+    if (!started.time_ns.ok()) return started.time_ns.error();
     if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
 
     const size_t in_flight = frames_in_flight(sequence, sink.cycles_kept);
     EventQueue<Event> queue(in_flight + 64);
-    Recording recording(sequence, sink, camera_ns_at_start);
+    Recording recording(sequence, sink, *started.time_ns);
+    const auto why_stop = [&]() -> std::string {
+        if (stop) return "the take was stopped";
+        const bool can_go_on = camera.state().kind == CameraState::live;
+        return can_go_on ? "" : "the take was stopped, as its camera gives no more frames";
+    };
     {
-        CameraReader reader(camera, stage.cameras[0], black_counts, in_flight, queue);
+        CameraReader reader(camera, config, black_counts, in_flight, queue);
         BoardLog log(
-            board, reader.arrivals(), stop, [&](LogNews news) { queue.push(std::move(news)); },
-            [&](std::string why) { queue.push(LogEnd{std::move(why)}); });
+            board, reader.arrivals(), why_stop, [&](LogNews news) { queue.push(std::move(news)); },
+            [&](LogEnd end) { queue.push(std::move(end)); });
         while (!recording.finished()) recording.handle(std::move(*queue.pop()));
         queue.close();
     }
     RecordReport report = recording.report();
-    report.frames_dropped_by_camera = camera.dropped() - dropped_before;
+    report.camera = camera.info();
+    report.camera_counts = camera.counts().since(counts_before);
     return report;
 }
 

@@ -29,10 +29,12 @@ struct RecordSink {
 struct RecordReport {
     uint64_t frames = 0, frames_discarded = 0, duplicates = 0, camera_restarts = 0;
     uint64_t slots_total = 0, slots_missing = 0;
-    uint64_t frames_dropped_by_camera = 0;
+    CameraInfo camera;           // as it was set up
+    CameraCounts camera_counts;  // of this take
     double clock_drift_ppm = 0;
     std::string unfit_frame;  // the first frame that was not of the stage's size or format; empty when there was none
     std::string board_end;    // why the board's log ended before the sequence did; empty when it did not
+    std::string camera_end;   // why the camera gave no more before it had delivered everything; empty when it had
 };
 
 // Frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof), those
@@ -43,9 +45,10 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
 // board's own, or says what a latched fault was.
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage);
 
-// Loads the sequence, arms and starts the board and returns when every trigger is decided. `stop` ends it early: the
-// board goes dark, what was fired is still identified, the rest is missing.
-// Errors: the board cannot be loaded or started. A board or camera that fails later is no error here: what was proved
+// Sets the camera up as the stage's first [[camera]] says and starts it, loads the sequence, arms and starts the board, and
+// returns when every trigger is decided. `stop` ends it early, and so does a camera that fails: the board goes dark, what was
+// fired is still identified, the rest is missing.
+// Errors: the camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that fails later is no error here: what was proved
 // stands, the rest is missing and says why.
 // `black_counts` is the camera's measured black level; without it, the one that each frame states.
 Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,

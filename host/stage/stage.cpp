@@ -105,6 +105,14 @@ CameraConfig read_camera(TomlSection& camera) {
     camera.read("noise_read_counts", config.noise.read_counts, 0, 1000);
     camera.read("noise_shot", config.noise.shot, 0, 1000);
     camera.read("trigger", config.trigger, 0, 3);
+    camera.read("trigger_source", config.trigger_source);
+    camera.read_choice<TriggerActivation>(
+        "trigger_activation", config.trigger_activation,
+        {{"rising_edge", TriggerActivation::rising_edge}, {"falling_edge", TriggerActivation::falling_edge}});
+    camera.read("trigger_delay_us", config.trigger_delay_us, 0, 1e6);
+    camera.read_choice<ExposureMode>("exposure_mode", config.exposure_mode,
+                                     {{"trigger_width", ExposureMode::trigger_width}, {"timed", ExposureMode::timed}});
+    camera.read("exposure_us", config.exposure_us, 0.1, 1e6);
     camera.read("position_m", config.position_m);
     camera.read("look_at_m", config.look_at_m);
     camera.read("up", config.up);

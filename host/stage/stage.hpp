@@ -8,6 +8,7 @@
 
 #include "image/frame.hpp"
 #include "result.hpp"
+#include "stage/camera_setup.hpp"
 #include "stage/lamp_response.hpp"
 #include "stage/lamps.hpp"
 
@@ -19,11 +20,8 @@ struct NoiseModel {
     double shot = 0.492;
 };
 
-struct CameraConfig {
-    std::string source = "";  // "ring:PATH"
-    int width = 640, height = 480;
-    Cfa cfa = Cfa::rggb;
-    int bits = 12;
+struct CameraConfig : CameraSetup {
+    std::string source = "";          // "ring:PATH" (device/camera.hpp)
     double black = 64, white = 4095;  // counts
     NoiseModel noise;
     int trigger = 0;  // which of the board's four trigger lines

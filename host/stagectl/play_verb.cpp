@@ -2,6 +2,7 @@
 // stagectl play: plays a sequence without recording it, and follows every trigger.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "program.hpp"
@@ -25,12 +26,13 @@ struct Options {
 
 // What the board's log told; with `json`, prints a line for each trigger.
 struct Account {
-    uint64_t triggers = 0, unseen = 0;  // those that were gone from the log before they were read
-    std::string end;
+    uint64_t triggers = 0, fired = 0;
+    LogEnd end;
 
+    uint64_t unseen() const { return fired - triggers; }  // gone from the log before they were read
     void add(const LogNews& news, bool json) {
+        fired = std::max(fired, news.next_counter);
         for (const auto& entry : news.entries) {
-            unseen += entry.counter - (triggers + unseen);
             ++triggers;
             if (json)
                 print_json({{"counter", uint32_t(entry.counter)},
@@ -51,9 +53,10 @@ Result<Sequence> compile(const Options& options, const StageConfig& stage) {
 
 void follow(Board& board, bool json, Account& account) {
     static const std::atomic<uint64_t> no_frames{0};
+    const std::atomic<bool>& stop = stop_on_signal();
     const BoardLog log(
-        board, no_frames, stop_on_signal(), [&](const LogNews& news) { account.add(news, json); },
-        [&](std::string why) { account.end = std::move(why); });
+        board, no_frames, [&] { return std::string(stop ? "stopped by you" : ""); },
+        [&](const LogNews& news) { account.add(news, json); }, [&](LogEnd end) { account.end = std::move(end); });
     // Its destructor waits for the end.
 }
 
@@ -68,16 +71,19 @@ Result<int> run(const Options& options) {
     if (const Status status = start_board(*board, *sequence, *stage); !status.ok()) return status.error();
     Account account;
     follow(*board, options.json, account);
+    if (account.end.is_lost)
+        return fail(
+            fmt::format("{}; after {} triggers the board's log could not be read", account.end.why, account.triggers));
     const auto status = board->status();
     if (!status.ok()) return status.error();
     fmt::print(stderr, "{} triggers", account.triggers);
-    if (account.unseen) fmt::print(stderr, ", {} more were gone before they were read", account.unseen);
+    if (account.unseen()) fmt::print(stderr, ", {} more were gone before they were read", account.unseen());
     if (sequence->config.playback.start == StartSource::photo)
         fmt::print(stderr, "; {} edges, {} of them missed", uint32_t(status->edges_seen),
                    uint32_t(status->edges_missed));
     fmt::print(stderr, "\n");
-    if (status->fault != OLS_FAULT_NONE) return fail(account.end);
-    return account.unseen ? 2 : 0;
+    if (status->fault != OLS_FAULT_NONE) return fail(account.end.why);
+    return account.unseen() ? 2 : 0;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "image/line_file.hpp"
 #include "image/outputs.hpp"
 #include "program.hpp"
+#include "record/camera_record.hpp"
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
@@ -57,11 +58,12 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"slots_missing", record.slots_missing},
             {"frames", record.frames},
             {"frames_discarded", record.frames_discarded},
-            {"frames_dropped_by_camera", record.frames_dropped_by_camera},
+            {"camera", camera_record(record.camera, record.camera_counts)},
             {"duplicates", record.duplicates},
             {"camera_restarts", record.camera_restarts},
             {"clock_drift_ppm", record.clock_drift_ppm},
             {"board_end", record.board_end},
+            {"camera_end", record.camera_end},
             {"targets_written", report.targets_written},
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
@@ -85,6 +87,7 @@ void print_report(const TakeReport& report, bool is_estimate, const std::string&
         fmt::print("{}: {} targets written, {} missing; {} of {} slots missing; {:.1f} s\n", options.output,
                    report.targets_written, report.targets_missing, record.slots_missing, record.slots_total,
                    report.seconds_total);
+    if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
     if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
     if (!record.unfit_frame.empty())
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",

@@ -50,15 +50,11 @@ void CameraDeveloper::add_frame(std::shared_ptr<const Frame> frame) {
     if (is_kept) store_.add(std::move(frame));
 }
 
-void CameraDeveloper::add_missing(const MissingSlot& slot) {
-    missing_.add(slot);
-    why_missing_ = slot.why;
-}
-
 CameraDeveloper::Job CameraDeveloper::gather(size_t index) const {
-    const uint64_t target = plan_[index].target;
-    if (is_performance_) return {uint32_t(index), store_.around(uint32_t(index), target)};
-    return {uint32_t(index), store_.cycle(uint32_t(target), take_.masks.fill_from_neighbours)};
+    const auto& [target, frames] = plan_[index];
+    std::string lost_by = missing_.cause_within(frames.first, frames.last);
+    if (is_performance_) return {uint32_t(index), store_.around(uint32_t(index), target), std::move(lost_by)};
+    return {uint32_t(index), store_.cycle(uint32_t(target), take_.masks.fill_from_neighbours), std::move(lost_by)};
 }
 
 void CameraDeveloper::hand_on(uint64_t decided) {
@@ -68,7 +64,7 @@ void CameraDeveloper::hand_on(uint64_t decided) {
         const bool is_last = next_ + 1 == plan_.size();
         store_.forget_before(is_last ? take_.sequence.trigger_count() : plan_[next_ + 1].frames.first);
         if (std::visit([](const auto& frames) { return has_no_frame(frames); }, job.frames)) {
-            lose(next_, next_);
+            lose(next_, next_, job.lost_by);
             continue;
         }
         flush_lost();
@@ -77,8 +73,8 @@ void CameraDeveloper::hand_on(uint64_t decided) {
 }
 
 // A take that ends early may have lost millions of targets: they are noted in runs.
-void CameraDeveloper::lose(size_t first, size_t last) {
-    const std::string why = "no frame of it was recorded: " + (why_missing_.empty() ? "the take ended" : why_missing_);
+void CameraDeveloper::lose(size_t first, size_t last, const std::string& lost_by) {
+    const std::string why = "no frame of it was recorded: " + (lost_by.empty() ? "the take ended" : lost_by);
     if (lost_ && lost_->why != why) flush_lost();
     if (!lost_) lost_ = LostTargets{camera_, uint32_t(first), uint32_t(last), why};
     lost_->last = uint32_t(last);
@@ -91,7 +87,7 @@ void CameraDeveloper::flush_lost() {
 
 CameraDeveloper::Report CameraDeveloper::finish() {
     if (!thread_.joinable()) return report_;
-    if (next_ < plan_.size()) lose(next_, plan_.size() - 1);
+    if (next_ < plan_.size()) lose(next_, plan_.size() - 1, "");
     flush_lost();
     work_.close();
     thread_.join();
@@ -119,6 +115,7 @@ TargetOutcome CameraDeveloper::develop(const Job& job) {
     auto target = std::visit([&](const auto& frames) { return develop(frames); }, job.frames);
     if (!target.ok()) {
         outcome.why = target.error().message;
+        if (!job.lost_by.empty()) outcome.why += "; the first was lost because: " + job.lost_by;
         return outcome;
     }
     outcome.target = std::make_unique<Target>(std::move(*target));

@@ -31,7 +31,7 @@ class CameraDeveloper {
     size_t target_count() const { return plan_.size(); }
 
     void add_frame(std::shared_ptr<const Frame> frame);
-    void add_missing(const MissingSlot& slot);
+    void add_missing(const MissingSlot& slot) { missing_.add(slot); }
 
     // Hands on the targets whose frames are all decided: those below `decided`.
     void hand_on(uint64_t decided);
@@ -45,10 +45,11 @@ class CameraDeveloper {
     struct Job {
         uint32_t index = 0;
         std::variant<CycleFrames, TargetFrames> frames;
+        std::string lost_by;  // why the first of its slots that is missing is; "" when none is
     };
 
     Job gather(size_t index) const;
-    void lose(size_t first, size_t last);
+    void lose(size_t first, size_t last, const std::string& lost_by);
     void flush_lost();
     void develop();
     TargetOutcome develop(const Job& job);
@@ -65,7 +66,6 @@ class CameraDeveloper {
     const std::vector<PlannedTarget> plan_;
     FrameStore store_;
     MissingRanges missing_;
-    std::string why_missing_;          // the last missing slot's reason
     size_t next_ = 0;                  // of the plan
     std::optional<LostTargets> lost_;  // the run that the next target may belong to
     Report report_;                    // the thread's until it has ended

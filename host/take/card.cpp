@@ -141,8 +141,9 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
     const auto report = record_take(board, camera, sequence, stage, std::nullopt, sink, stop);
     if (!report.ok()) return report.error();
     if (card.frames() == 0 || dark.frames() == 0)
-        return fail(fmt::format("{} of {} frames could be identified, not enough to calibrate{}{}",
+        return fail(fmt::format("{} of {} frames could be identified, not enough to calibrate{}{}{}",
                                 card.frames() + dark.frames(), report->slots_total,
+                                report->camera_end.empty() ? "" : "; " + report->camera_end,
                                 report->board_end.empty() ? "" : "; " + report->board_end,
                                 report->unfit_frame.empty() ? "" : "; frames came as " + report->unfit_frame));
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "record/camera_record.hpp"
+
 namespace ols {
 
 namespace {
@@ -102,7 +104,9 @@ nlohmann::json describe_take(const TakeDescription& take, const Board& board, co
                              {"duplicates", record.duplicates},
                              {"camera_restarts", record.camera_restarts},
                              {"clock_drift_ppm", record.clock_drift_ppm},
-                             {"board_end", record.board_end}}}};
+                             {"board_end", record.board_end},
+                             {"camera_end", record.camera_end},
+                             {"camera", camera_record(record.camera, record.camera_counts)}}}};
     if (take.targets.every > 0) json["motion"] = describe_motion(take.sequence, take.targets);
     return json;
 }

@@ -41,12 +41,13 @@ TakeReport merged(const RecordReport& record, const CameraDeveloper::Report& dev
 // Why a take has not one frame; nothing is kept of it.
 Error nothing_came(const RecordReport& record) {
     std::string why = "not one frame has its slot, and nothing is kept of the take";
-    if (!record.board_end.empty()) why += ": " + record.board_end;
+    for (const std::string& end : {record.camera_end, record.board_end})
+        if (!end.empty()) why += ": " + end;
     if (!record.unfit_frame.empty())
         why += fmt::format(": frames came as {}, which is not what the stage says of its camera", record.unfit_frame);
     else if (record.frames > 0)
         why += fmt::format(": {} frames came, and none fits the board's triggers", record.frames);
-    else if (record.board_end.empty())
+    else if (record.board_end.empty() && record.camera_end.empty())
         why += ": no frame came; check the camera, its trigger cable and that its source is this one";
     return fail(why);
 }

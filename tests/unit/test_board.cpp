@@ -254,6 +254,20 @@ TEST(Board, a_reply_to_an_earlier_request_and_noise_are_passed_over) {
     EXPECT_TRUE(board->arm().ok());
 }
 
+TEST(Board, one_that_sends_without_end_and_never_what_was_asked_for_is_given_up) {
+    class Chatterer : public Transfer {
+        Status write(std::span<const uint8_t>, uint32_t) override { return Done{}; }
+        Result<Bytes> read(size_t, uint32_t) override {
+            uint8_t stale[OLS_FRAME_BYTES_MAX];
+            const size_t n = ols_frame_encode(OLS_HELLO | OLS_REPLY, 999, nullptr, 0, stale, sizeof stale);
+            return Bytes(stale, stale + n);
+        }
+    };
+    const auto board = Board::connect(std::make_unique<Chatterer>());
+    ASSERT_FALSE(board.ok());
+    EXPECT_NE(board.error().message.find("not the answer"), std::string::npos) << board.error().message;
+}
+
 TEST(Board, a_silent_or_missing_board_is_an_error) {
     auto board = connect([](uint16_t, const Bytes&) { return Answer{0x1234, {}}; });
     EXPECT_FALSE(board->status().ok());

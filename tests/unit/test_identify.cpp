@@ -75,7 +75,8 @@ struct Delivery {
 struct Take {
     std::vector<Delivery> frames;  // frames[n] is trigger n's, in order of delivery
     std::vector<ols_trigger_log_entry> log;
-    std::string log_end;  // why the log stopped early
+    std::string log_end;     // why the log stopped early
+    std::string frames_end;  // why frames did
     size_t triggers = 0;
 };
 
@@ -142,7 +143,7 @@ Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_
     }
     tell_log(take.triggers, take.frames.size());
     identifier.end_log(take.log_end);
-    identifier.end_frames();
+    identifier.end_frames(take.frames_end);
     collect();
     outcome.accounted &= frames_seen.size() == take.frames.size() && triggers_seen.size() == take.triggers;
     return outcome;
@@ -285,6 +286,23 @@ TEST_P(IdentifyFaults, leave_the_expected_slots_missing_in_every_kind_of_slot_an
 }
 
 INSTANTIATE_TEST_SUITE_P(Bases, IdentifyFaults, testing::Values("single", "s159", "hadamard156"));
+
+TEST(Identify, a_camera_that_is_gone_is_why_its_later_frames_are_missing_and_not_why_an_earlier_one_is) {
+    SyntheticStage stage("single", 3);
+    Take take = record(stage);
+    const uint64_t lost = find_slot(stage.sequence, SlotKind::basis, 1, 7);
+    const uint64_t last = find_slot(stage.sequence, SlotKind::tracking, 2, 4);
+    take.frames.resize(last + 1);
+    take.frames.erase(take.frames.begin() + ptrdiff_t(lost));
+    take.frames_end = "the camera is gone";
+    const Outcome outcome = play(take, stage.sequence);
+    auto expected = range(last + 1, take.triggers);
+    expected.insert(lost);
+    EXPECT_EQ(outcome.missing, expected);
+    EXPECT_EQ(outcome.notes.at(last + 1).why, "the camera is gone");
+    EXPECT_EQ(outcome.notes.at(take.triggers - 1).why, "the camera is gone");
+    EXPECT_NE(outcome.notes.at(lost).why, "the camera is gone");
+}
 
 TEST(Identify, duplicates_are_counted) {
     SyntheticStage stage("single", 2);

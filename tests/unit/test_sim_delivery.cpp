@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "sim_scenes.hpp"
-#include "virtual_camera.hpp"
+#include "started_camera.hpp"
 
 using namespace ols;
 
@@ -50,14 +50,15 @@ class CardStage : public testing::Test {
     // Plays triggers of 1000 ticks every 2000 with one lamp lit and returns what the host finds.
     std::vector<Frame> play(int triggers, const std::vector<Fault>& faults, bool camera_model = true) {
         const ols::Setup setup{scene_, stage_, stage_.cameras[0], camera_model};
-        auto ring = RingWriter::create(folder_ / "cam0.ring", 32, frame_bytes(setup, {}));
+        auto ring = RingWriter::create(folder_ / "cam0.ring", 32, ring_content(setup, {}));
         auto reader = RingReader::open(folder_ / "cam0.ring");
         VirtualCamera camera(setup, {}, 0, std::move(*ring), truth_path(), faults, true, cancelled_);
+        start_camera(*reader, camera);
         for (int i = 0; i < triggers; ++i) camera.expose(exposure(10000 + uint64_t(i) * 2000));
         camera.set_now(10000 + uint64_t(triggers) * 2000);
         camera.finish();
         std::vector<Frame> frames;
-        while (!reader->closed())
+        while (reader->writer() == RingReader::Writer::live)
             if (auto frame = reader->read(10)) frames.push_back(std::move(*frame));
         watermark_ns_ = reader->watermark_ns();
         return frames;

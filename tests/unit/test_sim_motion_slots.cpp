@@ -10,7 +10,7 @@
 
 #include "sim_scenes.hpp"
 #include "slot_frames.hpp"
-#include "virtual_camera.hpp"
+#include "started_camera.hpp"
 
 using namespace ols;
 
@@ -49,9 +49,10 @@ class Slots : public testing::Test {
         const auto folder = std::filesystem::temp_directory_path() / ("slots" + std::to_string(getpid()));
         std::filesystem::create_directories(folder);
         std::atomic<bool> cancelled = false;
-        auto ring = RingWriter::create(folder / "cam0.ring", 32, frame_bytes(setup, {}));
+        auto ring = RingWriter::create(folder / "cam0.ring", 32, ring_content(setup, {}));
         auto reader = RingReader::open(folder / "cam0.ring");
         VirtualCamera camera(setup, {}, 0, std::move(*ring), folder / "cam0.frames.jsonl", {}, true, cancelled);
+        start_camera(*reader, camera);
         uint64_t light = 1'000'000;
         for (uint32_t c = 0; c < cycles; ++c)
             for (const Slot& slot : sequence_.slots) {
@@ -64,7 +65,7 @@ class Slots : public testing::Test {
             }
         camera.finish();
         std::vector<Frame> frames;
-        while (!reader->closed())
+        while (reader->writer() == RingReader::Writer::live)
             if (auto frame = reader->read(10)) frames.push_back(std::move(*frame));
         std::filesystem::remove_all(folder);
         return frames;

@@ -67,6 +67,21 @@ TEST_F(StageFile, lamps_of_an_lp_file_beside_it_replace_the_geometry) {
     EXPECT_EQ(stage->chain_bit_of_lamp, (std::vector<int>{7, 0, 1, 2}));
 }
 
+TEST_F(StageFile, says_how_a_camera_is_triggered_and_exposed) {
+    const auto stage = read_stage(
+        write("stage.toml",
+              "[[camera]]\ntrigger_source = \"Line1\"\ntrigger_activation = \"falling_edge\"\ntrigger_delay_us = 2.5\n"
+              "exposure_mode = \"timed\"\nexposure_us = 250\n"));
+    ASSERT_TRUE(stage.ok()) << stage.error().message;
+    const CameraSetup& setup = stage->cameras[0];
+    EXPECT_EQ(setup.trigger_source, "Line1");
+    EXPECT_EQ(setup.trigger_activation, TriggerActivation::falling_edge);
+    EXPECT_EQ(setup.trigger_delay_us, 2.5);
+    EXPECT_EQ(setup.exposure_mode, ExposureMode::timed);
+    EXPECT_EQ(setup.exposure_us, 250);
+    EXPECT_NE(error_of("[[camera]]\nexposure_mode = \"auto\"\n").find("none of: "), std::string::npos);
+}
+
 TEST_F(StageFile, white_follows_the_bits_of_the_camera) {
     const auto stage = read_stage(write("stage.toml", "[[camera]]\nbits = 10\n"));
     ASSERT_TRUE(stage.ok());

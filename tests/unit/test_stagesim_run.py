@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """stagesim as a process: exposures in by socket, frames out by the ring, checked with numpy against the noise model and `stagesim
 render`."""
+import fcntl
 import json
 import mmap
 import os
@@ -19,6 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 STAGESIM = ROOT / "build/host/bin/stagesim"
 WIDTH, HEIGHT, BLACK = 96, 72, 64
 TICK_NS = 8
+F_OFD_SETLK = 37  # linux/fcntl.h
 ALL_LAMPS, NO_LAMP = "f" * 39 + "0" * 5, "0" * 44  # 156 of 176 chain bits
 
 SCENE = """
@@ -64,9 +66,43 @@ def connect(work, process):
     raise TimeoutError("stagesim does not listen")
 
 
-def read_ring(path):
-    """All frames of a closed ring (host/device/ring.hpp): (id, camera time in ns, samples)."""
-    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as ring:
+class Ring:
+    """The reading end of a ring (host/device/ring.hpp), as its header describes it."""
+
+    def __init__(self, path):
+        self.file = open(path, "r+b")
+        whole_byte_0 = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 1, 0)
+        fcntl.fcntl(self.file, F_OFD_SETLK, whole_byte_0)
+        self.map = mmap.mmap(self.file.fileno(), 0)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.map.close()
+        self.file.close()
+
+    def start(self, client):
+        """As the board, answers the stage that asks whether every earlier exposure is behind."""
+        asked = struct.unpack_from("<I", self.map, 140)[0] + 1
+        struct.pack_into("<II", self.map, 140, asked, 1)
+        question = json.loads(client.makefile().readline())
+        assert question["type"] == "sync"
+        client.sendall((json.dumps({**question, "tick": 0}) + "\n").encode())
+        for _ in range(600):
+            if struct.unpack_from("<I", self.map, 96)[0] == asked:
+                return
+            time.sleep(0.05)
+        raise TimeoutError("stagesim does not start the camera")
+
+    def head(self):
+        return struct.unpack_from("<Q", self.map, 64)[0]
+
+
+def read_ring(ring):
+    """All frames of a closed ring: (id, camera time in ns, samples)."""
+    with ring:
+        ring = ring.map
         slots, stride = struct.unpack_from("<II", ring, 8)
         head, watermark_ns, _, _, closed = struct.unpack_from("<QQQII", ring, 64)
         assert closed == 1 and head <= slots
@@ -83,9 +119,11 @@ def read_ring(path):
 def play(work, messages, *options):
     process = start(work, *options)
     with connect(work, process) as client:
+        ring = Ring(work / "cam0.ring")
+        ring.start(client)
         client.sendall("".join(json.dumps(message) + "\n" for message in messages).encode())
     assert process.wait(timeout=60) == 0, process.stderr.read()
-    return read_ring(work / "cam0.ring")
+    return read_ring(ring)
 
 
 def render_counts(work):
@@ -143,17 +181,35 @@ def test_the_same_exposures_give_the_same_bits_and_another_seed_does_not(work):
 def test_sigterm_ends_it_in_order_with_its_account(work):
     process = start(work)
     with connect(work, process) as client:
+        ring = Ring(work / "cam0.ring")
+        ring.start(client)
         client.sendall((json.dumps(exposure(0, ALL_LAMPS, 2000)) + "\n").encode())
-        for _ in range(200):
-            with open(work / "cam0.ring", "rb") as ring:
-                if struct.unpack_from("<Q", ring.read(72), 64)[0] == 1:
-                    break
+        for _ in range(600):
+            if ring.head() == 1:
+                break
             time.sleep(0.05)
         os.kill(process.pid, signal.SIGTERM)
         assert process.wait(timeout=30) == 0
     actual = json.loads((work / "cost.json").read_text())["actual"]
     assert actual["triggers"] == actual["frames_delivered"] == 1
-    assert read_ring(work / "cam0.ring")[0][0][0] == 1
+    assert read_ring(ring)[0][0][0] == 1
+
+
+def test_frames_that_nobody_has_asked_for_are_counted_and_said_and_none_waits(work):
+    """Many more than the ring has room for; and the count of ids and the truth go on."""
+    process = start(work)
+    with connect(work, process) as client:
+        lines = [exposure(n, ALL_LAMPS, 2000) for n in range(1000)]
+        client.sendall("".join(json.dumps(message) + "\n" for message in lines).encode())
+        ring = Ring(work / "cam0.ring")
+        ring.start(client)
+        client.sendall((json.dumps(exposure(1000, ALL_LAMPS, 2000)) + "\n").encode())
+    assert process.wait(timeout=60) == 0
+    assert [frame_id for frame_id, _, _ in read_ring(ring)[0]] == [1001]
+    assert "nobody records from camera 0" in process.stderr.read()
+    actual = json.loads((work / "cost.json").read_text())["actual"]
+    assert actual["frames_unwanted"] == 1000 and actual["frames_delivered"] == 1
+    assert len((work / "cam0.frames.jsonl").read_text().splitlines()) == 1001
 
 
 @pytest.mark.parametrize("arguments, message", [

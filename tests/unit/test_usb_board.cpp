@@ -103,6 +103,15 @@ TEST(UsbTransfer, passes_over_the_empty_packet_that_ends_a_message) {
     EXPECT_EQ(*(*transfer)->read(64, 1500), Bytes(3, 0x55));
 }
 
+TEST(UsbTransfer, gives_up_a_board_that_sends_nothing_but_empty_packets) {
+    ScriptedBus bus;
+    bus.reads.assign(1000, {UsbOutcome::done, 0});
+    const auto transfer = open_usb_transfer(bus, {});
+    const auto read = (*transfer)->read(64, 1500);
+    ASSERT_FALSE(read.ok());
+    EXPECT_NE(read.error().message.find("empty packets"), std::string::npos) << read.error().message;
+}
+
 TEST(UsbTransfer, names_each_way_in_which_a_transfer_ends_early) {
     ScriptedBus bus;
     bus.reads = {{UsbOutcome::stalled, 0}, {UsbOutcome::timed_out, 0}, {UsbOutcome::gone, 0}, {UsbOutcome::failed, 0}};

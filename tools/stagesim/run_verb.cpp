@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <thread>
 
 #include "image/outputs.hpp"
 #include "image/whole_file.hpp"
@@ -28,8 +26,6 @@ struct RunOptions {
     bool once = false, no_board = false, json = false;
 };
 
-// With --once, a frame that waits this long for room in its ring is taken to have lost its reader for good.
-constexpr std::chrono::seconds reader_patience(20);
 // With --once, board time without exposures after the USB client has gone that counts as the end.
 constexpr uint64_t idle_ticks = 500'000;  // 4 ms
 
@@ -64,19 +60,16 @@ class StageRun {
             if (!started) return started.error();
             board.emplace(std::move(*started));
         }
-        std::thread patience([this] { watch_readers(); });
         const Status status = follow(board ? &*board : nullptr);
-        ended_ = true;
-        patience.join();
         for (auto& camera : cameras_) camera->finish();
         if (!status) return status;
         for (auto& camera : cameras_)
             if (const Status told = camera->truth_written(); !told) return told;
-        if (gave_up_)
-            return fail("frames waited in the ring for a reader that did not come: start the capture program first");
-        if (board)
+        if (board) {
+            board->stop();
             if (const int code = board->wait(); code != 0)
                 return fail(fmt::format("the emulated board ended with status {}: its message is above", code));
+        }
         return write_cost();
     }
 
@@ -111,16 +104,17 @@ class StageRun {
         setups_.push_back(
             std::make_unique<Setup>(Setup{inputs_.scene, inputs_.stage, config, options_.camera_model == "on"}));
         // Some 64 MB of frames, so that the reader may pause without the board standing still.
-        const uint64_t bytes = frame_bytes(*setups_.back(), options_.inputs.disabled_set());
-        const uint32_t slots = uint32_t(std::clamp<uint64_t>((64 << 20) / bytes, 8, 256));
-        auto ring = RingWriter::create(fmt::format("{}/cam{}.ring", options_.work, index), slots, bytes);
+        const RingContent content = ring_content(*setups_.back(), options_.inputs.disabled_set());
+        const uint32_t slots = uint32_t(std::clamp<uint64_t>((64 << 20) / content.frame_bytes(), 8, 256));
+        auto ring = RingWriter::create(fmt::format("{}/cam{}.ring", options_.work, index), slots, content);
         if (!ring) return ring.error();
         foretold_.push_back(foretell(*setups_.back(), options_.inputs.disabled_set()));
         cameras_.push_back(std::make_unique<VirtualCamera>(*setups_.back(), options_.inputs.disabled_set(), index,
                                                            std::move(*ring),
                                                            fmt::format("{}/cam{}.frames.jsonl", options_.work, index),
-                                                           faults, options_.pace == "virtual", cancelled_));
+                                                           faults, options_.pace == "virtual", stop_requested));
         if (const Status told = cameras_.back()->truth_written(); !told) return told;
+        starts_.emplace_back();
         Renderer& renderer = cameras_.back()->renderer();
         // The board starts when the lamps are done: its socket says that the stage is ready. A moving scene is looked at once, so
         // that its first frame comes soon after its trigger, not when the daemon takes the camera for dead.
@@ -155,9 +149,9 @@ class StageRun {
         bool stopping = false;
         std::string line;
         for (;;) {
-            if (!stopping && (stop_requested || gave_up_ || finished())) {
+            answer_starts();
+            if (!stopping && (stop_requested || finished())) {
                 stopping = true;
-                cancelled_ = true;
                 if (!board) return Done{};
                 board->stop();
             }
@@ -178,11 +172,19 @@ class StageRun {
     void handle(const BoardMessage& message) {
         if (const auto* exposure = std::get_if<ExposureMessage>(&message)) {
             quiet_since_ = exposure->fall;
-            for (size_t i = 0; i < cameras_.size(); ++i)
-                if (inputs_.stage.cameras[i].trigger == exposure->trigger) cameras_[i]->expose(*exposure);
+            for (size_t i = 0; i < cameras_.size(); ++i) {
+                if (inputs_.stage.cameras[i].trigger != exposure->trigger) continue;
+                const uint64_t unwanted = cameras_[i]->unwanted();
+                cameras_[i]->expose(*exposure);
+                if (unwanted == 0 && cameras_[i]->unwanted() == 1)
+                    fmt::print(stderr,
+                               "stagesim: nobody records from camera {}: such frames are not made, and counted\n", i);
+            }
         } else if (const auto* now = std::get_if<NowMessage>(&message)) {
             now_ = now->tick;
             for (auto& camera : cameras_) camera->set_now(now->tick);
+        } else if (const auto* sync = std::get_if<SyncMessage>(&message)) {
+            confirm_starts(sync->n, sync->tick);
         } else if (const auto* usb = std::get_if<UsbMessage>(&message)) {
             client_gone_ = client_came_ && !usb->connected;
             client_came_ = client_came_ || usb->connected;
@@ -192,18 +194,22 @@ class StageRun {
 
     bool finished() const { return options_.once && client_gone_ && now_ >= quiet_since_ + idle_ticks; }
 
-    // With --once, gives up on frames that nobody will ever take.
-    void watch_readers() {
-        while (!ended_) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-            if (stop_requested) cancelled_ = true;
-            const int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
-            for (auto& camera : cameras_) {
-                const int64_t since_ns = camera->waiting_since_ns();
-                if (options_.once && since_ns != 0 && std::chrono::nanoseconds(now_ns - since_ns) > reader_patience)
-                    gave_up_ = cancelled_ = true;
-            }
+    // A camera starts when the board says that every exposure before is behind us; without a board there is none.
+    void answer_starts() {
+        for (size_t i = 0; i < cameras_.size(); ++i) {
+            const auto start = cameras_[i]->start_asked();
+            if (!start || start == starts_[i].start) continue;
+            starts_[i] = {*start, ++syncs_};
+            if (listener_->has_client())
+                listener_->send(fmt::format("{{\"type\":\"sync\",\"n\":{}}}\n", syncs_));
+            else
+                confirm_starts(syncs_, now_);
         }
+    }
+
+    void confirm_starts(uint64_t sync, uint64_t tick) {
+        for (size_t i = 0; i < cameras_.size(); ++i)
+            if (starts_[i].start && starts_[i].sync == sync) cameras_[i]->confirm_start(*starts_[i].start, tick);
     }
 
     Status write_cost() {
@@ -214,6 +220,7 @@ class StageRun {
             actual["triggers"] = camera.triggers();
             actual["frames_delivered"] = camera.delivered();
             actual["frames_dropped"] = camera.dropped();
+            actual["frames_unwanted"] = camera.unwanted();
             nlohmann::json entry = {{"foretold", foretold_[i]}, {"actual", actual}};
             if (i == 0) report = entry;
             report["cameras"].push_back(std::move(entry));
@@ -229,7 +236,12 @@ class StageRun {
     std::vector<nlohmann::json> foretold_;
     std::vector<std::unique_ptr<VirtualCamera>> cameras_;
     std::optional<LineListener> listener_;
-    std::atomic<bool> cancelled_ = false, gave_up_ = false, ended_ = false;
+    struct Start {
+        std::optional<uint32_t> start;  // the last one asked for
+        uint64_t sync = 0;              // whose answer confirms it
+    };
+    std::vector<Start> starts_;  // by camera
+    uint64_t syncs_ = 0;
     bool client_came_ = false, client_gone_ = false;
     uint64_t now_ = 0, quiet_since_ = 0;
 };

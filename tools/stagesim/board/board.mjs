@@ -16,6 +16,7 @@ import { VcdWriter } from './vcd.mjs';
 
 const TICK_HZ = 125_000_000;
 const EXIT_VIOLATION = 3;
+const PLUG_TICKS = TICK_HZ / 2; // for a device that was plugged in to be found and configured, the host's waiting included
 const PARENT_MS = 500;
 
 async function main() {
@@ -65,9 +66,13 @@ async function main() {
   const usb = options.usb ? new UsbSocket(options.usb, {
     host: () => board.usbHost,
     onActivity: () => pacer.wake(),
-    onClient: (connected) => stage?.send({ type: 'usb', connected }),
+    onClient: (connected) => {
+      stage?.send({ type: 'usb', connected });
+      if (connected) pacer.wake(PLUG_TICKS);
+    },
     log,
   }) : null;
+  if (stage) stage.now = () => Math.min(board.tick, recorder.openSince);
   await usb?.listen();
   await can?.listen();
 

@@ -2,6 +2,7 @@
 // Sends exposures to the virtual stage as JSON lines (docs/architecture.md, "Exposures: emulated board to virtual
 // stage").
 import { connect } from 'node:net';
+import { createInterface } from 'node:readline';
 
 const END_MS = 2000;
 
@@ -21,6 +22,9 @@ export class ExposureSocket {
     this.dropped = 0;
     /** Called when the reader has caught up, or has gone. */
     this.onReady = () => {};
+    /** The tick before which every exposure that rose has been sent. */
+    this.now = () => 0;
+    createInterface({ input: socket }).on('line', (line) => this.#answer(line)).on('error', () => {});
     const drained = () => {
       this.#full = false;
       this.onReady();
@@ -53,6 +57,16 @@ export class ExposureSocket {
       this.dropped++;
       return;
     }
+    this.#write(message);
+  }
+
+  /** A question of the reader's, {"type":"sync","n":N}: the answer stands behind all that was sent before, and is never dropped. */
+  #answer(line) {
+    const { type, n } = JSON.parse(line);
+    if (type === 'sync' && !this.#closed) this.#write({ type, n, tick: this.now() });
+  }
+
+  #write(message) {
     this.#full = !this.#socket.write(`${JSON.stringify(message)}\n`);
   }
 

@@ -56,10 +56,10 @@ export class Pacer {
     if (stage) stage.onReady = () => this.#resume();
   }
 
-  /** Something has come in from a client: time goes on. */
-  wake() {
+  /** Something has come in from a client: time goes on, for so many ticks even where the reader of exposures is behind. */
+  wake(ticks = GRANT_TICKS) {
     this.#quietSince = null;
-    this.#grantedUntil = this.#board.tick + GRANT_TICKS;
+    this.#grantedUntil = Math.max(this.#grantedUntil, this.#board.tick + ticks);
     this.#resume();
   }
 

@@ -37,6 +37,7 @@ Result<BoardMessage> parse_board_message(const std::string& line) {
         const std::string type = message.at("type");
         if (type == "exposure") return BoardMessage(parse_exposure(message));
         if (type == "now") return BoardMessage(NowMessage{message.at("tick")});
+        if (type == "sync") return BoardMessage(SyncMessage{message.at("n"), message.at("tick")});
         if (type == "usb") return BoardMessage(UsbMessage{message.at("connected")});
         return BoardMessage(OtherMessage{type});
     } catch (const std::exception&) {

@@ -25,13 +25,17 @@ struct ExposureMessage {
 struct NowMessage {
     uint64_t tick = 0;  // every exposure that rose before it has been told of
 };
+// The answer to a line {"type":"sync","n":N} of ours: what came before it is all that happened before the board read that.
+struct SyncMessage {
+    uint64_t n = 0, tick = 0;  // every exposure that rose before the tick has been told of
+};
 struct UsbMessage {
     bool connected = false;
 };
 struct OtherMessage {
     std::string type;  // hello, reset, end, or one of a newer board
 };
-using BoardMessage = std::variant<ExposureMessage, NowMessage, UsbMessage, OtherMessage>;
+using BoardMessage = std::variant<ExposureMessage, NowMessage, SyncMessage, UsbMessage, OtherMessage>;
 
 // The error quotes the line.
 Result<BoardMessage> parse_board_message(const std::string& line);

@@ -19,6 +19,12 @@ extern char** environ;
 
 namespace ols {
 
+namespace {
+
+constexpr std::chrono::seconds stop_patience(20);
+
+}  // namespace
+
 Result<BoardProcess> BoardProcess::start(const std::vector<std::string>& command) {
     std::vector<char*> argv;
     for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
@@ -35,24 +41,22 @@ Result<BoardProcess> BoardProcess::start(const std::vector<std::string>& command
 }
 
 void BoardProcess::stop() {
-    if (running()) kill(pid_, SIGTERM);
+    if (!running()) return;
+    kill(pid_, SIGTERM);
+    if (!kill_at_) kill_at_ = std::chrono::steady_clock::now() + stop_patience;
 }
 
 bool BoardProcess::running() {
     if (pid_ < 0 || status_) return false;
     int status = 0;
     if (waitpid(pid_, &status, WNOHANG) == pid_) status_ = status;
+    if (!status_ && kill_at_ && std::chrono::steady_clock::now() > *kill_at_) kill(pid_, SIGKILL);
     return !status_;
 }
 
 int BoardProcess::wait() {
-    int status = 0;
-    while (!status_) {
-        if (waitpid(pid_, &status, 0) == pid_)
-            status_ = status;
-        else if (errno != EINTR)
-            return -1;
-    }
+    while (running()) usleep(10'000);
+    if (!status_) return -1;
     return WIFEXITED(*status_) ? WEXITSTATUS(*status_) : 128 + WTERMSIG(*status_);
 }
 
@@ -95,6 +99,15 @@ LineListener::~LineListener() {
     unlink(path_.c_str());
 }
 
+void LineListener::send(const std::string& line) {
+    for (size_t sent = 0; client_ >= 0 && sent < line.size();) {
+        const ssize_t count = ::send(client_, line.data() + sent, line.size() - sent, MSG_NOSIGNAL);
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0) return;
+        sent += size_t(count);
+    }
+}
+
 LineListener::Event LineListener::read(std::string& line) {
     for (;;) {
         const size_t end = input_.find('\n', read_to_);
@@ -106,7 +119,7 @@ LineListener::Event LineListener::read(std::string& line) {
         }
         read_to_ = input_.size();
         pollfd wait{client_ >= 0 ? client_ : listener_, POLLIN, 0};
-        if (poll(&wait, 1, 100) <= 0) return Event::timeout;
+        if (poll(&wait, 1, 20) <= 0) return Event::timeout;
         if (client_ < 0) {
             client_ = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
             continue;

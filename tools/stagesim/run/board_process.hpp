@@ -2,6 +2,7 @@
 // The emulated board as a child process, and the socket on which it tells of exposures.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,13 +16,15 @@ class BoardProcess {
     // Starts a program found on the PATH.
     static Result<BoardProcess> start(const std::vector<std::string>& command);
 
-    // Asks it to end (SIGTERM).
+    // Asks it to end (SIGTERM); one that has not after twenty seconds is killed in running() or wait().
     void stop();
     // Waits for its end; its exit status, 128 + signal if one killed it.
     int wait();
     bool running();
 
-    BoardProcess(BoardProcess&& other) noexcept : pid_(other.pid_), status_(other.status_) { other.pid_ = -1; }
+    BoardProcess(BoardProcess&& other) noexcept : pid_(other.pid_), status_(other.status_), kill_at_(other.kill_at_) {
+        other.pid_ = -1;
+    }
     BoardProcess& operator=(BoardProcess&&) = delete;
     ~BoardProcess();
 
@@ -29,6 +32,7 @@ class BoardProcess {
     explicit BoardProcess(int pid) : pid_(pid) {}
     int pid_;
     std::optional<int> status_;
+    std::optional<std::chrono::steady_clock::time_point> kill_at_;
 };
 
 class LineListener {
@@ -37,9 +41,13 @@ class LineListener {
     static Result<LineListener> listen(const std::string& path);
 
     enum class Event { line, timeout, end };
-    // The next line of the one client, without its newline. `timeout` after 100 ms without one; `end` when the client
+    // The next line of the one client, without its newline. `timeout` after 20 ms without one; `end` when the client
     // has closed the connection.
     Event read(std::string& line);
+
+    bool has_client() const { return client_ >= 0; }
+    // Sends the client a line, given with its newline. One that has gone is seen by read().
+    void send(const std::string& line);
 
     LineListener(LineListener&& other) noexcept;
     LineListener& operator=(LineListener&&) = delete;

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -41,10 +40,14 @@ Frame make_frame(const Exposure& exposure, const CameraConfig& camera, const Eff
     return frame;
 }
 
-uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled) {
+RingContent ring_content(const Setup& setup, const std::set<std::string>& disabled) {
     const EffectSet effects(setup, disabled);
-    const uint64_t samples = uint64_t(setup.camera.width) * setup.camera.height * (effects.mosaic() ? 1 : 3);
-    return samples * (effects.active("quantisation") ? sizeof(uint16_t) : sizeof(float));
+    RingContent content;
+    content.width = uint32_t(setup.camera.width), content.height = uint32_t(setup.camera.height);
+    content.cfa = effects.mosaic() ? setup.camera.cfa : Cfa::rgb;
+    content.format = effects.active("quantisation") ? PixelFormat::u16 : PixelFormat::f32;
+    content.bits = uint32_t(setup.camera.bits);
+    return content;
 }
 
 VirtualCamera::VirtualCamera(const Setup& setup, const std::set<std::string>& disabled, uint32_t index, RingWriter ring,
@@ -69,12 +72,17 @@ void VirtualCamera::expose(const ExposureMessage& message) {
     }
     if (delivery_.strikes(FaultKind::drop_trigger, trigger)) return;
 
-    const double middle_us = (double(message.rise - first_rise_) + double(message.fall - first_rise_)) / 2;
+    const CameraStamp stamp{next_frame_id_++, time_ns(message.rise)};
     const std::vector<double> lit_us = lit_microseconds(message, setup_.stage);
+    write_truth(stamp, trigger, message.rise, lit_us);
+    if (!ring_.wanted()) {
+        ++unwanted_;
+        return;
+    }
+    const double middle_us = (double(message.rise - first_rise_) + double(message.fall - first_rise_)) / 2;
     const Exposure exposure = renderer_.expose(lit_us, middle_us * microseconds_per_tick, trigger, index_);
     Frame frame = make_frame(exposure, setup_.camera, renderer_.effects());
-    frame.stamp = {next_frame_id_++, camera_time_ns(clock_, message.rise - clock_epoch_tick_)};
-    write_truth(frame.stamp, trigger, message.rise, lit_us);
+    frame.stamp = stamp;
     delivery_.send(std::move(frame), trigger, [this](Frame f) { deliver(std::move(f)); });
 }
 
@@ -88,14 +96,24 @@ void VirtualCamera::write_truth(const CameraStamp& stamp, uint64_t trigger, uint
 }
 
 void VirtualCamera::deliver(Frame frame) {
-    waiting_since_ns_ = std::chrono::steady_clock::now().time_since_epoch().count();
-    const bool taken = ring_.write(frame, wait_for_reader_, cancelled_);
-    waiting_since_ns_ = 0;
-    ++(taken ? delivered_ : dropped_);
+    switch (ring_.write(frame, wait_for_reader_, cancelled_)) {
+        case RingWriter::Outcome::written: ++delivered_; break;
+        case RingWriter::Outcome::unwanted: ++unwanted_; break;
+        case RingWriter::Outcome::full:
+        case RingWriter::Outcome::cancelled: ++dropped_; break;
+    }
+}
+
+uint64_t VirtualCamera::time_ns(uint64_t tick) const {
+    return camera_time_ns(clock_, tick - std::min(tick, clock_epoch_tick_));
 }
 
 void VirtualCamera::set_now(uint64_t tick) {
-    ring_.set_watermark(camera_time_ns(clock_, tick - std::min(tick, clock_epoch_tick_)));
+    ring_.set_watermark(time_ns(tick));
+}
+
+void VirtualCamera::confirm_start(uint32_t start, uint64_t tick) {
+    ring_.confirm_start(start, time_ns(tick));
 }
 
 void VirtualCamera::finish() {

@@ -22,8 +22,8 @@ uint64_t camera_time_ns(const CameraClock& clock, uint64_t tick);
 // white. Without quantisation: 32-bit counts above black, so black is 0, and no white (the largest float).
 Frame make_frame(const Exposure& exposure, const CameraConfig& camera, const EffectSet& effects);
 
-// The size of such a frame.
-uint64_t frame_bytes(const Setup& setup, const std::set<std::string>& disabled);
+// What the camera's ring is told of such frames.
+RingContent ring_content(const Setup& setup, const std::set<std::string>& disabled);
 
 class VirtualCamera {
   public:
@@ -35,21 +35,26 @@ class VirtualCamera {
                   const std::atomic<bool>& cancelled);
 
     Renderer& renderer() { return renderer_; }
-    // Steps for an exposure of this camera's trigger; scene time is counted from the first trigger.
+    // Steps for an exposure of this camera's trigger; scene time is counted from the first trigger. A frame that nobody wants
+    // is counted, and not rendered.
     void expose(const ExposureMessage& message);
     void set_now(uint64_t tick);
+
+    // A start that the ring's reader waits for, until it is confirmed with a tick before which every exposure is behind.
+    std::optional<uint32_t> start_asked() const { return ring_.start_asked(); }
+    void confirm_start(uint32_t start, uint64_t tick);
     void finish();
 
     uint64_t triggers() const { return triggers_; }
     uint64_t delivered() const { return delivered_; }
     uint64_t dropped() const { return dropped_; }
+    uint64_t unwanted() const { return unwanted_; }
     // The first error of writing `frames_path`.
     Status truth_written() const { return frames_file_.status(); }
-    // Steady-clock nanoseconds since which a frame has been waiting for room in the ring, 0 when none is.
-    int64_t waiting_since_ns() const { return waiting_since_ns_.load(); }
 
   private:
     void deliver(Frame frame);
+    uint64_t time_ns(uint64_t tick) const;
     void write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick, const std::vector<double>& lit_us);
 
     const Setup& setup_;
@@ -63,8 +68,7 @@ class VirtualCamera {
     CameraClock clock_;
     uint64_t clock_epoch_tick_ = 0;  // the board tick at which clock_ began
     uint64_t first_rise_ = 0;
-    uint64_t next_frame_id_ = 1, triggers_ = 0, delivered_ = 0, dropped_ = 0;
-    std::atomic<int64_t> waiting_since_ns_ = 0;
+    uint64_t next_frame_id_ = 1, triggers_ = 0, delivered_ = 0, dropped_ = 0, unwanted_ = 0;
 };
 
 }  // namespace ols

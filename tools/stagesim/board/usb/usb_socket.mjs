@@ -11,6 +11,9 @@ const REPLY_BYTES = 16;
 const PAYLOAD_LIMIT = 1 << 20;
 const TYPES = ['control', 'bulk', 'cancel'];
 const HANDOVER_MS = 200;
+const FAREWELL_MS = 2000;
+const BUSY = -6; // a client is turned away
+const NO_BYTES = Buffer.alloc(0);
 
 export class UsbSocket {
   #server;
@@ -60,16 +63,16 @@ export class UsbSocket {
     if (this.#client !== null) {
       // A client that reconnects may be seen before its old connection's end is.
       this.#client.once('close', () => {
-        clearTimeout(turnAway);
+        clearTimeout(patience);
         this.#accept(socket);
       });
-      const turnAway = setTimeout(() => {
+      const patience = setTimeout(() => {
         this.#log('usb: a second client was turned away');
-        socket.destroy();
+        turnAway(socket);
       }, HANDOVER_MS);
       return;
     }
-    if (socket.destroyed) return;
+    if (socket.destroyed || socket.writableEnded) return;
     this.#client = socket;
     this.#onClient(true);
     socket.on('data', (bytes) => {
@@ -138,14 +141,26 @@ export class UsbSocket {
     const done = (status, bytes) => {
       finished = true;
       this.#inFlight.delete(tag);
-      const header = Buffer.alloc(REPLY_BYTES);
-      header.writeUInt32LE(REPLY_MAGIC, 0);
-      header.writeUInt32LE(tag, 4);
-      header.writeInt32LE(status, 8);
-      header.writeUInt32LE(bytes.length, 12);
-      if (!client.destroyed && client.writable) client.write(Buffer.concat([header, bytes]));
+      if (!client.destroyed && client.writable) client.write(replyTo(tag, status, bytes));
     };
     const handle = this.#host().submit({ ...request, done });
     if (!finished) this.#inFlight.set(tag, handle);
   }
+}
+
+/** Says why, and takes in what the client still sends until it goes. */
+function turnAway(socket) {
+  if (socket.writable) socket.end(replyTo(0, BUSY, NO_BYTES));
+  socket.resume();
+  socket.unref();
+  setTimeout(() => socket.destroy(), FAREWELL_MS).unref();
+}
+
+function replyTo(tag, status, bytes) {
+  const header = Buffer.alloc(REPLY_BYTES);
+  header.writeUInt32LE(REPLY_MAGIC, 0);
+  header.writeUInt32LE(tag, 4);
+  header.writeInt32LE(status, 8);
+  header.writeUInt32LE(bytes.length, 12);
+  return Buffer.concat([header, bytes]);
 }
