@@ -8,6 +8,8 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
+#include "flow/brightness_range.hpp"
+
 namespace ols {
 
 namespace {
@@ -17,19 +19,16 @@ cv::Mat mat_of(const Image& image) {
 }
 
 // The range of both images' brightness, but for the thousandth at either end, onto 0 to 255.
-void quantize(const FlowPair& pair, cv::Mat& from, cv::Mat& to) {
+void quantize(const Image& from_image, const Image& to_image, cv::Mat& from, cv::Mat& to) {
     std::vector<float> sample;
-    sample.reserve(2 * pair.from.data.size() / 7 + 2);
-    for (const Image* image : {&pair.from, &pair.to})
+    sample.reserve(2 * from_image.data.size() / 7 + 2);
+    for (const Image* image : {&from_image, &to_image})
         for (size_t p = 0; p < image->data.size(); p += 7) sample.push_back(image->data[p]);
-    const size_t tail = sample.size() / 1000;
-    std::nth_element(sample.begin(), sample.begin() + ptrdiff_t(tail), sample.end());
-    const float darkest = sample[tail];
-    std::nth_element(sample.begin(), sample.end() - 1 - ptrdiff_t(tail), sample.end());
-    const float range = sample[sample.size() - 1 - tail] - darkest;
+    const BrightnessRange found = range_without(sample, sample.size() / 1000);
+    const float range = found.high - found.low;
     const double scale = range > 0 ? 255 / double(range) : 0;
-    mat_of(pair.from).convertTo(from, CV_8U, scale, -darkest * scale);
-    mat_of(pair.to).convertTo(to, CV_8U, scale, -darkest * scale);
+    mat_of(from_image).convertTo(from, CV_8U, scale, -found.low * scale);
+    mat_of(to_image).convertTo(to, CV_8U, scale, -found.low * scale);
 }
 
 // OpenCV reads beside images that are only few patches wide: those get a border on the right and below.
@@ -116,14 +115,15 @@ void follow_seen(const Image& seen, FlowField& flow) {
 
 }  // namespace
 
-FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
+FlowField dis_flow(const Image& from_image, const Image& to_image, const Image& from_seen,
+                   const DisFlowOptions& options, const FlowField* initial) {
     cv::Mat from, to;
-    quantize(pair, from, to);
+    quantize(from_image, to_image, from, to);
     FlowField flow = options.search ? searched(from, to, options, initial)
                      : initial      ? *initial
                                     : FlowField(from.cols, from.rows);
     if (options.final_refinements > 0) refine(from, to, options, flow);
-    follow_seen(pair.from_seen, flow);
+    follow_seen(from_seen, flow);
     return flow;
 }
 

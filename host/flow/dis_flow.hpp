@@ -20,7 +20,8 @@ struct DisFlowOptions {
     int final_refinements = 0;  // fixed-point iterations more, from the flow found, at full resolution
 };
 
-// Deterministic: the same bits for any thread count. Non-empty images of the same size.
-FlowField dis_flow(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial = nullptr);
+// Deterministic: the same bits for any thread count. Non-empty images of the same size; `from_seen` as FlowPair's.
+FlowField dis_flow(const Image& from, const Image& to, const Image& from_seen, const DisFlowOptions& options,
+                   const FlowField* initial = nullptr);
 
 }  // namespace ols

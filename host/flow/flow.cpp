@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "flow/brightness_range.hpp"
+
 namespace ols {
 
 namespace {
@@ -17,21 +19,32 @@ cv::Mat mat_of(const Image& image) {
     return cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.data.data()));
 }
 
+bool sees(float value, float saturation) {
+    constexpr float most = std::numeric_limits<float>::max();
+    return (value >= -most) & (value <= most) & (value < saturation);  // false of what is no number
+}
+
+// The usual image, in one pass that the compiler makes vectors of.
+bool sees_all(const Image& image, float saturation) {
+    unsigned unseen = 0;
+    for (const float value : image.data) unseen += !sees(value, saturation);
+    return unseen == 0;
+}
+
 // Marks what is not seen and two pixels around it, as far as derivatives reach, and fills it with the mean of what is seen
 // nearby. Empty when all is seen.
 Image hide_unseen(Image& image, float saturation) {
     constexpr double nearby = 4;  // pixels
+    if (sees_all(image, saturation)) return {};
     Image seen(image.width, image.height, 1);
     double sum = 0, count = 0;
     for (size_t p = 0; p < image.data.size(); ++p) {
-        const bool sees = std::isfinite(image.data[p]) && image.data[p] < saturation;
-        seen.data[p] = sees ? 1.0f : 0.0f;
-        if (sees)
+        seen.data[p] = sees(image.data[p], saturation) ? 1.0f : 0.0f;
+        if (seen.data[p] != 0)
             sum += image.data[p], count++;
         else
             image.data[p] = 0;
     }
-    if (count == double(image.data.size())) return {};
     const float mean = count > 0 ? float(sum / count) : 0;
     cv::Mat values, weights;
     cv::GaussianBlur(mat_of(image), values, {0, 0}, nearby, nearby, cv::BORDER_REPLICATE);
@@ -47,29 +60,20 @@ Image hide_unseen(Image& image, float saturation) {
     return eroded;
 }
 
-struct Range {
-    float low, high;
-};
-
 // Between the hundredths at either end, of means over 4 x 4 pixels, which noise and glints do not rule; between the extremes
 // where a subject is smaller than that and all else even.
-Range brightness_range(const Image& image) {
+BrightnessRange brightness_range(const Image& image) {
     cv::Mat small;
     cv::resize(mat_of(image), small, {image.width / 4, image.height / 4}, 0, 0, cv::INTER_AREA);
     std::vector<float> values(small.begin<float>(), small.end<float>());
-    const size_t tail = values.size() / 100, top = values.size() - 1 - tail;
-    std::nth_element(values.begin(), values.begin() + ptrdiff_t(tail), values.end());
-    const float low = values[tail];
-    std::nth_element(values.begin(), values.begin() + ptrdiff_t(top), values.end());
-    if (values[top] > low) return {low, values[top]};
-    const auto [least, most] = std::minmax_element(values.begin(), values.end());
-    return {*least, *most};
+    const BrightnessRange range = range_without(values, values.size() / 100);
+    return range.high > range.low ? range : range_without(values, 0);
 }
 
 // Brings an image to a range of about 0 to 1. Each by its own range: exposures may differ. False where it is even: there is
 // nothing to find.
 bool equalize_exposure(Image& image) {
-    const Range range = brightness_range(image);
+    const BrightnessRange range = brightness_range(image);
     const float scale = 1 / (range.high - range.low);
     if (!(range.high > range.low) || !std::isfinite(scale)) return false;
     for (float& v : image.data) v = (v - range.low) * scale;
@@ -140,14 +144,25 @@ Status check(const BroxFlowOptions& o) {
     return check_descent(o);
 }
 
-FlowField run(const FlowPair& pair, const DisFlowOptions& options, const FlowField* initial) {
-    return dis_flow(pair, options, initial);
+// Where one of them is not seen as a whole, both have what of them is.
+FlowPair pair_of(const FlowImage& from, const FlowImage& to) {
+    FlowPair pair{from.image, to.image, from.seen, to.seen};
+    if (pair.from_seen.data.empty() != pair.to_seen.data.empty()) {
+        Image& all = pair.from_seen.data.empty() ? pair.from_seen : pair.to_seen;
+        all = Image(from.image.width, from.image.height, 1);
+        std::fill(all.data.begin(), all.data.end(), 1.0f);
+    }
+    return pair;
 }
-FlowField run(const FlowPair& pair, const RobustFlowOptions& options, const FlowField* initial) {
-    return robust_flow(pair, options, initial);
+
+FlowField run(const FlowImage& from, const FlowImage& to, const DisFlowOptions& options, const FlowField* initial) {
+    return dis_flow(from.image, to.image, from.seen, options, initial);
 }
-FlowField run(const FlowPair& pair, const BroxFlowOptions& options, const FlowField* initial) {
-    return brox_flow(pair, options, initial);
+FlowField run(const FlowImage& from, const FlowImage& to, const RobustFlowOptions& options, const FlowField* initial) {
+    return robust_flow(pair_of(from, to), options, initial);
+}
+FlowField run(const FlowImage& from, const FlowImage& to, const BroxFlowOptions& options, const FlowField* initial) {
+    return brox_flow(pair_of(from, to), options, initial);
 }
 
 struct NamedMethod {
@@ -222,14 +237,8 @@ Result<FlowField> estimate_flow(const FlowImage& from, const FlowImage& to, cons
     if (Status sane = std::visit([](const auto& method) { return check(method); }, options.method); !sane)
         return sane.error();
     if (from.is_even || to.is_even) return initial ? *initial : FlowField(from.image.width, from.image.height);
-    FlowPair pair{from.image, to.image, from.seen, to.seen};
-    if (pair.from_seen.data.empty() != pair.to_seen.data.empty()) {
-        Image& all = pair.from_seen.data.empty() ? pair.from_seen : pair.to_seen;
-        all = Image(from.image.width, from.image.height, 1);
-        std::fill(all.data.begin(), all.data.end(), 1.0f);
-    }
     try {
-        return std::visit([&](const auto& method) { return run(pair, method, initial); }, options.method);
+        return std::visit([&](const auto& method) { return run(from, to, method, initial); }, options.method);
     } catch (const cv::Exception& e) {
         return fail(std::string("flow: OpenCV refuses: ") + e.what());
     }

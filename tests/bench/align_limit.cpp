@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "align_score.hpp"
-#include "renderer.hpp"
+#include "render/renderer.hpp"
 
 namespace ols {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "true_flow.hpp"
+#include "render/true_flow.hpp"
 
 namespace ols {
 

@@ -176,7 +176,8 @@ void Bench::measure(const Knob& knob) {
                     {"ratio_to_peer", timings[i].ratio_to_peer},
                     {"threads", setting.threads},
                     {"rounds", rounds},
-                    {"bytes", bytes[i] ? Json(*bytes[i]) : Json()}});
+                    {"bytes", bytes[i] ? Json(*bytes[i]) : Json()},
+                    {"detail", setting.detail}});
     }
 }
 

@@ -14,7 +14,7 @@
 //     }
 //
 //     bench_inversion           measures; a line a setting: subject, knob, setting, default, peer, error, error_unit,
-//                               ms_median, ratio_to_peer, threads, rounds, bytes
+//                               ms_median, ratio_to_peer, threads, rounds, bytes, detail
 //     bench_inversion --list    the registry: a line for the subject and one for each knob, nothing measured
 //     bench_inversion --smoke   every setting twice at tiny sizes, so that tests see that the program works
 //     --rounds N                instead of 15
@@ -40,6 +40,7 @@ struct Setting {
     std::function<double()> error;       // of the latest run against truth, in the knob's unit; exact is 0
     int threads = 1;                     // that `run` uses
     std::function<void()> prepare = {};  // before each run, not timed; may be none
+    std::string detail = "";             // what ran, where the name leaves it open: a library's kernel, as it was found
 };
 
 struct Knob {

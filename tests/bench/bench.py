@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Measures what accuracy costs: runs the benchmark programs, keeps their rows in out/bench/<subject>.json, and writes
-docs/accuracy.md with its plot when every subject has been measured.
+"""Measures what accuracy costs: runs the benchmark programs, keeps their rows in out/bench/<subject>.json, and writes their sections of
+docs/accuracy.md and their pictures.
 
     bench.py                        all subjects; `align` renders its scenes into out/bench/motion the first time, for minutes
-    bench.py --subject inversion    one; the others' rows stay as they are
+    bench.py --subject inversion    one; the others' sections stay as they are
     bench.py --smoke                every program at tiny sizes; writes nothing
-    bench.py --docs                 measures nothing; writes the page from the rows there are
+    bench.py --docs                 measures nothing; writes the sections of the rows there are
 """
 import argparse
 import json
@@ -19,7 +19,8 @@ import page
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build/host/bin"
 RESULTS = ROOT / "out/bench"
-ROW_KEYS = ("knob", "setting", "default", "peer", "error", "error_unit", "ms_median", "ratio_to_peer", "threads", "rounds", "bytes")
+ROW_KEYS = ("knob", "setting", "default", "peer", "error", "error_unit", "ms_median", "ratio_to_peer", "threads", "rounds", "bytes",
+            "detail")
 
 
 def subjects():
@@ -56,22 +57,23 @@ def machine():
 def measure(subject, rounds):
     rows = [{key: line[key] for key in ROW_KEYS} for line in lines_of(subject, "--rounds", str(rounds))]
     RESULTS.mkdir(parents=True, exist_ok=True)
-    (RESULTS / f"{subject}.json").write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
-    (RESULTS / "machine.txt").write_text(machine() + "\n")
-    return rows
+    lines = ",\n".join(json.dumps(row) for row in rows)
+    (RESULTS / f"{subject}.json").write_text(f'{{"machine": {json.dumps(machine())}, "rows": [\n{lines}\n]}}\n')
 
 
-def write_docs(registry):
-    missing = [subject["subject"] for subject, _ in registry if not (RESULTS / f"{subject['subject']}.json").exists()]
-    if missing:
-        print(f"bench: docs/accuracy.md stays as it is until {', '.join(missing)} are measured, too")
-        return 0
+def write_docs(registry, subjects_to_write):
+    """1 if a default is off the front without a reason."""
     import plot  # matplotlib takes a second to load
 
-    results = {subject["subject"]: json.loads((RESULTS / f"{subject['subject']}.json").read_text()) for subject, _ in registry}
-    (ROOT / "docs/accuracy.md").write_text(page.page(registry, results, (RESULTS / "machine.txt").read_text().strip()))
-    plot.draw(registry, results, ROOT / "docs/images/accuracy.png")
-    problems = [text for subject, knobs in registry for text in page.unexplained(subject, knobs, results[subject["subject"]])]
+    results = {name: json.loads((RESULTS / f"{name}.json").read_text()) for name in subjects_to_write}
+    path = ROOT / "docs/accuracy.md"
+    path.write_text(page.page(path.read_text(), registry, results))
+    problems = []
+    for subject, knobs in registry:
+        name = subject["subject"]
+        if name in results:
+            plot.draw(knobs, results[name]["rows"], ROOT / f"docs/images/accuracy_{name}.png")
+            problems += page.unexplained(subject, knobs, results[name]["rows"])
     for problem in problems:
         print(f"bench: {problem}", file=sys.stderr)
     return 1 if problems else 0
@@ -96,12 +98,16 @@ def main():
     if options.smoke:
         return smoke()
     registry = list_registry()
-    for subject, knobs in registry:
-        if not options.docs and options.subject in (None, subject["subject"]):
-            print(f"bench: {subject['subject']}", flush=True)
-            rows = measure(subject["subject"], options.rounds)
-            print(page.section(subject, knobs, rows))
-    sys.exit(write_docs(registry))
+    asked = [subject["subject"] for subject, _ in registry if options.subject in (None, subject["subject"])]
+    if options.docs:
+        sys.exit(write_docs(registry, [name for name in asked if (RESULTS / f"{name}.json").exists()]))
+    for name in asked:
+        print(f"bench: {name}", flush=True)
+        measure(name, options.rounds)
+    problems = write_docs(registry, asked)
+    sections = page.sections_of((ROOT / "docs/accuracy.md").read_text())
+    print("".join(sections[name] for name in asked))
+    sys.exit(problems)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The inversion of a basis to single lamps: arithmetic and method, what it writes, how images are stored, SIMD path.
-// links: ols_demultiplex PkgConfig::OPENBLAS Eigen3::Eigen
+// links: ols_demultiplex ols_bench_openblas Eigen3::Eigen
 #include <cblas.h>
 
 #include <half.h>
@@ -13,6 +13,7 @@
 #include "demultiplex/demultiplex.hpp"
 #include "demultiplex/hadamard_tile.hpp"
 #include "four_russians.hpp"
+#include "openblas_kernel.hpp"
 
 using namespace ols;
 
@@ -119,6 +120,11 @@ class Inversion {
         };
         return {name, run, [this] { return float_error(); }};
     }
+    Setting openblas() {
+        Setting setting = product("OpenBLAS sgemm", &Inversion::by_openblas);
+        setting.detail = openblas_kernel_note();
+        return setting;
+    }
     void by_openblas() {
         cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, basis.images(), int(rows_.pitch), basis.rows, 1,
                     scaled_weights_.data(), basis.rows, float_rows_.samples.get(), int(rows_.pitch), 0,
@@ -210,9 +216,8 @@ void measure_methods(Bench& bench, Inversion& work) {
          .default_setting = "structured int16",
          .why_off_front =
              "frames come as images and the chain reads floats; tiles and shorts are for who can use them.",
-         .settings = {work.product("OpenBLAS sgemm", &Inversion::by_openblas),
-                      work.product("Eigen sgemm", &Inversion::by_eigen), work.four_russians(), work.any_basis(),
-                      work.structured("structured int32", Rows::wide, work.floats(), false),
+         .settings = {work.openblas(), work.product("Eigen sgemm", &Inversion::by_eigen), work.four_russians(),
+                      work.any_basis(), work.structured("structured int32", Rows::wide, work.floats(), false),
                       work.structured("structured int16", Rows::plain, work.floats(), false),
                       work.structured("structured int16, tiles to shorts", Rows::tiled, work.shorts(), true)}});
 }
@@ -224,8 +229,7 @@ void measure_storage(Bench& bench, Inversion& work) {
                    .peer = "OpenBLAS sgemm",
                    .default_setting = "images to floats",
                    .why_off_front = "floats in images are what the rest of the chain reads.",
-                   .settings = {work.product("OpenBLAS sgemm", &Inversion::by_openblas),
-                                work.structured("images to floats", Rows::plain, work.floats(), false),
+                   .settings = {work.openblas(), work.structured("images to floats", Rows::plain, work.floats(), false),
                                 work.structured("images to halves", Rows::plain, work.halves(), false),
                                 work.structured("images to shorts", Rows::plain, work.shorts(), false),
                                 work.structured("tiles to floats", Rows::tiled, work.floats(), false),
@@ -261,14 +265,14 @@ void measure_bases(Bench& bench, Inversion& s159, Inversion& hadamard156) {
                    .error_unit = "counts, largest",
                    .peer = "OpenBLAS sgemm",
                    .default_setting = "s159",
-                   .settings = {s159.product("OpenBLAS sgemm", &Inversion::by_openblas),
-                                s159.structured("s159", Rows::tiled, s159.shorts(), true),
+                   .settings = {s159.openblas(), s159.structured("s159", Rows::tiled, s159.shorts(), true),
                                 hadamard156.structured("hadamard156", Rows::tiled, hadamard156.shorts(), true)}});
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+    choose_openblas_kernel(argc, argv, {.rows = 156, .columns = 640 * 48, .inner = 159});
     openblas_set_num_threads(1);
     Bench bench(
         argc, argv,

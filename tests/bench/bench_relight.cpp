@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Relighting: the weights that lamps get from an environment, and the weighted sum of OLAT images.
-// links: ols_relight PkgConfig::OPENBLAS
+// links: ols_relight ols_bench_openblas
 #include <cblas.h>
 
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bench.hpp"
+#include "openblas_kernel.hpp"
 #include "relight/relight.hpp"
 
 using namespace ols;
@@ -107,8 +108,10 @@ void measure_sums(Bench& bench) {
         cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, 3, int(samples), lamp_count, 1, columns.data(),
                     lamp_count, block.data(), int(samples), 0, product.data(), int(samples));
     };
-    std::vector<Setting> settings = {
-        {"OpenBLAS sgemm", [&] { sgemm(1); }, [&] { return error_of(product.data(), 1); }}};
+    std::vector<Setting> settings = {{.name = "OpenBLAS sgemm",
+                                      .run = [&] { sgemm(1); },
+                                      .error = [&] { return error_of(product.data(), 1); },
+                                      .detail = openblas_kernel_note()}};
     for (const int threads : {1, 2})
         settings.push_back(
             {threads == 1 ? "1 thread" : "2 threads",
@@ -130,6 +133,7 @@ void measure_sums(Bench& bench) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    choose_openblas_kernel(argc, argv, {.rows = 3, .columns = 640 * 480, .inner = lamp_count});
     Bench bench(
         argc, argv,
         {.name = "relight",

@@ -11,8 +11,8 @@
 
 #include "develop/frame_store.hpp"
 #include "image/whole_file.hpp"
-#include "inputs.hpp"
-#include "slot_frames.hpp"
+#include "run/inputs.hpp"
+#include "run/slot_frames.hpp"
 
 namespace ols {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "develop/motion_developer.hpp"
-#include "effects/effect.hpp"
+#include "render/effects/effect.hpp"
 #include "stage/calibration.hpp"
 
 namespace ols {

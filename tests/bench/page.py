@@ -7,23 +7,19 @@ import pareto
 HEAD = """# What accuracy costs
 
 Every approximation has a knob. For each setting: its error against truth, its time beside a named peer's in the same run, its memory. This
-page, its table and its plot are written by `make bench`, which also leaves the figures in `out/bench/<subject>.json`
-(`make bench SUBJECT=inversion` measures one subject only).
+page, its tables and its pictures are written by `make bench`, which also leaves the figures in `out/bench/<subject>.json`
+(`make bench SUBJECT=inversion` measures one subject, and leaves the others as they are).
 
 - **error** is against a truth that the measured code did not make; each subject says which. 0 is exact.
-- **time** is the median over {rounds} rounds. All settings of a knob run in every round, so that a disturbance of the machine meets all of them.
+- **time** is the median over the rounds. All settings of a knob run in every round, so that a disturbance of the machine meets all of them.
   With one thread it is processor time, with more the clock's.
 - **speed** is the peer's time over the setting's own, the median over the rounds: above 1 is faster than the peer.
 - **memory** is what a run makes resident at its peak beyond its inputs and outputs.
 - **Bold** is the default; a ● marks the Pareto front: no other setting of the knob is as accurate and faster, or more accurate and no slower (times
   within 3 % count as equal).
 
-Measured on {machine}.
-
-![Error over time for each knob](images/accuracy.png)
-
-*Each panel is a knob: error over time, both logarithmic, exact results on the bottom line. The line is the Pareto front, the circle the
-default, the square the peer.*
+In the pictures both axes are logarithmic, and exact results stand on the bottom line. Times of subjects that were measured on different
+machines are not to be compared.
 """
 COLUMNS = "| knob | setting | | error | time, ms | speed | threads | memory, MB |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n"
 
@@ -93,7 +89,9 @@ def default_on_front(knob, rows):
 
 def knob_sentence(knob, rows):
     """Where the knob is set, its peer, and how the default stands."""
-    text = f"- `{knob['knob']}` is set by {knob['set_by']}; its peer is {knob['peer']}. The default, {knob['default']}, is "
+    peer = next(row for row in rows_of(knob, rows) if row["setting"] == knob["peer"])
+    detail = f" ({peer['detail']})" if peer["detail"] else ""
+    text = f"- `{knob['knob']}` is set by {knob['set_by']}; its peer is {knob['peer']}{detail}. The default, {knob['default']}, is "
     if default_on_front(knob, rows):
         return text + "on the Pareto front.\n"
     return text + f"not on the Pareto front: {knob['why_off_front']}\n"
@@ -105,8 +103,17 @@ def unexplained(subject, knobs, rows):
             for knob in knobs if not knob["table"] and not default_on_front(knob, rows) and not knob["why_off_front"]]
 
 
-def section(subject, knobs, rows):
-    text = f"\n## {subject['subject'].capitalize()}\n\n{subject['truth']}\n\n{subject['advice']}\n\n"
+def head_of(subject):
+    return f"\n## {subject['subject'].capitalize()}\n"
+
+
+def section(subject, knobs, result):
+    """result: {"machine", "rows"} as `make bench` keeps it."""
+    rows = result["rows"]
+    rounds = " or ".join(map(str, sorted({row["rounds"] for row in rows})))
+    name = subject["subject"]
+    text = f"{head_of(subject)}\n{subject['truth']}\n\n{subject['advice']}\n\n"
+    text += f"![{name.capitalize()}: error over time](images/accuracy_{name}.png)\n\n"
     alone = [knob for knob in knobs if not knob["table"]]
     text += COLUMNS if alone else ""
     for knob in alone:
@@ -114,21 +121,29 @@ def section(subject, knobs, rows):
         on_front = [row["setting"] for row in pareto.front(own)]
         text += "".join(table_line(row, i == 0, row["setting"] in on_front) for i, row in enumerate(own))
     text += "\n" + "".join(knob_sentence(knob, rows) for knob in alone)
+    text += f"- Measured on {result['machine']}, {rounds} rounds.\n"
     return text + "".join(table(title, of_table, rows) for title, of_table in tables_of(knobs).items())
 
 
-def page(registry, results, machine):
-    """registry: [(subject, knobs)] as programs list them; results: rows by subject name."""
-    counts = sorted({row["rounds"] for rows in results.values() for row in rows})
-    rounds = " or ".join(map(str, counts))
-    return HEAD.format(machine=machine, rounds=rounds) + "".join(section(subject, knobs, results[subject["subject"]]) for subject, knobs in registry)
+def sections_of(text):
+    """{subject's name: its section} of a page, in its order."""
+    return {part.partition("\n")[0].lower(): "\n## " + part for part in text.split("\n## ")[1:]}
+
+
+def page(text, registry, results):
+    """The page with a section for each subject of the registry, [(subject, knobs)] as programs list them: made of `results`, by subject
+    name, or as it stands in `text`, the page so far."""
+    kept = sections_of(text)
+    parts = [section(subject, knobs, results[subject["subject"]]) if subject["subject"] in results else kept.get(subject["subject"], "")
+             for subject, knobs in registry]
+    return HEAD + "".join(part.rstrip("\n") + "\n" for part in parts if part)
 
 
 def missing(registry, text):
     """Knobs and defaults of the registry that the page does not name."""
     problems = []
     for subject, knobs in registry:
-        part = text.partition(f"\n## {subject['subject'].capitalize()}\n")[2].partition("\n## ")[0]
+        part = sections_of(text).get(subject["subject"], "")
         for knob in knobs:
             if f"\n| {knob['knob']} | " not in part:
                 problems.append(f"docs/accuracy.md does not have the knob '{knob['knob']}' of {subject['subject']}: run `make bench`")

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The machinery of `make bench`: the Pareto front against its definition, a page that follows from its rows, and a registry that the
 committed page covers."""
+import platform
 import random
+import re
 
 import bench
 import page
@@ -15,10 +17,14 @@ KNOB = {"subject": "inversion", "knob": "method", "set_by": "`--method`", "error
 
 def row(setting, ms, error, **other):
     return {"knob": "method", "setting": setting, "default": setting == "fast", "peer": "plain", "error": error, "error_unit": "counts",
-            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "rounds": 15, "bytes": 2_000_000, **other}
+            "ms_median": ms, "ratio_to_peer": 20 / ms, "threads": 1, "rounds": 15, "bytes": 2_000_000, "detail": "", **other}
 
 
 ROWS = [row("plain", 20.0, 0.0), row("fast", 2.0, 0.125), row("wrong", 3.0, None)]
+
+
+def section(knobs, rows, **subject):
+    return page.section({**SUBJECT, **subject}, knobs, {"machine": "a machine", "rows": rows})
 
 
 def beats(one, other, tolerance):
@@ -41,7 +47,7 @@ def test_equal_rows_are_both_on_the_front():
 
 
 def test_the_page_has_each_setting_with_its_figures_and_marks():
-    text = page.page([(SUBJECT, [KNOB])], {"inversion": ROWS}, "a machine")
+    text = section([KNOB], ROWS)
     assert "| method | plain | ● | 0 | 20 | 1 | 1 | 2 |\n" in text
     assert "|  | **fast** | ● | 0.12 counts | 2 | 10 | 1 | 2 |\n" in text
     assert "|  | wrong |  | not finite | 3 | 6.67 | 1 | 2 |\n" in text
@@ -53,11 +59,11 @@ def test_a_default_off_the_front_is_explained_by_the_registry_or_reported():
     assert "'fast'" in page.unexplained(SUBJECT, [KNOB], rows)[0]
     knob = {**KNOB, "why_off_front": "it needs no table."}
     assert page.unexplained(SUBJECT, [knob], rows) == []
-    assert "not on the Pareto front: it needs no table." in page.page([(SUBJECT, [knob])], {"inversion": rows}, "a machine")
+    assert "not on the Pareto front: it needs no table." in section([knob], rows)
 
 
 def test_a_knob_that_the_page_lacks_and_a_changed_default_are_found():
-    text = page.page([(SUBJECT, [KNOB])], {"inversion": ROWS}, "a machine")
+    text = section([KNOB], ROWS)
     assert page.missing([(SUBJECT, [KNOB])], text) == []
     assert "'threads'" in page.missing([(SUBJECT, [KNOB, {**KNOB, "knob": "threads"}])], text)[0]
     assert "'plain'" in page.missing([(SUBJECT, [{**KNOB, "default": "plain"}])], text)[0]
@@ -70,7 +76,7 @@ def test_knobs_of_one_table_are_lines_of_it_and_an_error_relative_to_a_peak_is_a
     rows = [{**row("plain", 1, 10.0), "knob": "turning"}, {**row("fast", 2, 1.0), "knob": "turning"},
             {**row("plain", 1, 0.0), "knob": "still"}, {**row("fast", 2, None), "knob": "still"}]
     rows = [{**one, "error_unit": page.PSNR_UNIT} for one in rows]
-    text = page.page([(SUBJECT, knobs)], {"inversion": rows}, "a machine")
+    text = section(knobs, rows)
     assert "\nHow near.\n\n| dB | plain | **fast** |\n| --- | --- | --- |\n| turning | 20.0 | 40.0 |\n| still | exact | not finite |\n" in text
     assert page.missing([(SUBJECT, knobs)], text) == []
     assert page.unexplained(SUBJECT, knobs, rows) == []
@@ -81,12 +87,73 @@ def test_figures_have_three_digits(value, text):
     assert page.significant(value, 3) == text
 
 
-def test_the_plot_is_the_same_for_the_same_rows(tmp_path):
+def test_the_page_says_which_kernel_the_peer_ran():
+    rows = [row("plain", 20.0, 0.0, detail="kernel Haswell"), row("fast", 2.0, 0.125)]
+    assert "its peer is plain (kernel Haswell). The default" in section([KNOB], rows)
+
+
+def sgemm_details():
+    rows = bench.lines_of("inversion", "--smoke")
+    return {one["detail"] for one in rows if one["setting"] == "OpenBLAS sgemm"}
+
+
+def test_the_sgemm_peer_runs_the_fastest_of_its_kernels(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
+    (detail,) = sgemm_details()
+    kernel, times = re.fullmatch(r"kernel (\S+), the fastest here: (.*), for 156 x 159 x \d+", detail).groups()
+    by_kernel = {name: float(ms) for name, ms in re.findall(r"(\S+) (\S+) ms", times)}
+    assert by_kernel[kernel] == min(by_kernel.values())
+
+
+def test_the_sgemm_peer_runs_the_kernel_that_is_asked_for(monkeypatch):
+    if platform.machine() != "x86_64":
+        pytest.skip("the kernel's name is x86's")
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Nehalem")
+    assert sgemm_details() == {"kernel Nehalem, as OPENBLAS_CORETYPE asks"}
+
+
+def test_measuring_one_subject_leaves_the_sections_and_machines_of_the_others():
+    masks = ({**SUBJECT, "subject": "masks"}, [{**KNOB, "subject": "masks"}])
+    registry = [(SUBJECT, [KNOB]), masks]
+    before = page.page("", registry, {name: {"machine": "an old one", "rows": ROWS} for name in ("inversion", "masks")})
+    after = page.page(before, registry, {"masks": {"machine": "a new one", "rows": [row("plain", 30.0, 0.0), row("fast", 3.0, 0.5)]}})
+    parts, parts_before = page.sections_of(after), page.sections_of(before)
+    assert parts["inversion"] == parts_before["inversion"] and "an old one" in parts["inversion"]
+    assert "| method | plain | ● | 0 | 30 |" in parts["masks"] and "a new one" in parts["masks"]
+    assert page.page(after, registry, {}) == after
+
+
+def test_a_picture_is_the_same_for_the_same_rows(tmp_path):
     import plot
 
     for name in ("a.png", "b.png"):
-        plot.draw([(SUBJECT, [KNOB])], {"inversion": ROWS}, tmp_path / name)
+        plot.draw([KNOB], ROWS, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def overlaps(texts):
+    boxes = [text.get_window_extent() for text in texts]
+    return [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if a.overlaps(b)]
+
+
+def test_no_two_names_of_a_picture_overlap_and_each_setting_has_one():
+    import plot
+    from matplotlib import pyplot
+
+    rows = [row(f"setting {i} of a knob", 10 * 1.02**i, 0.1 + 0.001 * (i % 3)) for i in range(9)]
+    figure, axes = pyplot.subplots(figsize=(9, 2.9), dpi=180)
+    plot.draw_panel(axes, "near each other", rows)
+    names = [text for text in axes.texts]
+    assert sorted(text.get_text() for text in names) == sorted(one["setting"] for one in rows)
+    assert overlaps(names) == []
+    pyplot.close(figure)
+
+
+def test_every_section_of_the_page_has_its_picture():
+    text = (bench.ROOT / "docs/accuracy.md").read_text()
+    for name, part in page.sections_of(text).items():
+        assert f"(images/accuracy_{name}.png)" in part
+        assert (bench.ROOT / f"docs/images/accuracy_{name}.png").exists()
 
 
 def test_every_registered_knob_has_its_place_in_the_docs():
