@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 namespace ols {
 
@@ -19,6 +21,34 @@ void request_stop(int signal_number) {
     std::signal(signal_number, SIG_DFL);
 }
 
+// What `open` gives, tried again while it fails and the wait is not over.
+template <typename Open>
+auto open_within(double wait_s, Open open) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
+    auto opened = open();
+    if (!opened.ok() && wait_s > 0)
+        fmt::print(stderr, "stagectl: {}: waiting, {:g} s at most\n", opened.error().message, wait_s);
+    while (!opened.ok() && std::chrono::steady_clock::now() < deadline) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        opened = open();
+    }
+    return opened;
+}
+
+std::string board_link(const LinkOptions& options, const StageConfig& stage) {
+    return options.board.empty() ? stage.board : options.board;
+}
+
+Result<Board> connect_board(const std::string& link) {
+    auto transfer = open_transfer(link);
+    if (!transfer.ok()) return transfer.error();
+    return Board::connect(std::move(*transfer));
+}
+
+Error which_board() {
+    return fail("which board? give --board, or a link in the stage's [board]");
+}
+
 }  // namespace
 
 void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
@@ -27,6 +57,9 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
                     "the board, usb:, usb:SERIAL or socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera)
         verb.add_option("--camera", camera, "the camera, ring:PATH or fake:RATE; otherwise stage.toml's camera source");
+    verb.add_option("--wait", wait_s,
+                    "seconds to wait for what is not there yet, as a virtual stage that still renders")
+        ->check(CLI::NonNegativeNumber);
 }
 
 Result<StageConfig> open_stage(const LinkOptions& options) {
@@ -35,11 +68,9 @@ Result<StageConfig> open_stage(const LinkOptions& options) {
 }
 
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage) {
-    const std::string link = options.board.empty() ? stage.board : options.board;
-    if (link.empty()) return fail("which board? give --board, or a link in the stage's [board]");
-    auto transfer = open_transfer(link);
-    if (!transfer.ok()) return transfer.error();
-    return Board::connect(std::move(*transfer));
+    const std::string link = board_link(options, stage);
+    if (link.empty()) return which_board();
+    return open_within(options.wait_s, [&] { return connect_board(link); });
 }
 
 Result<StageSession> open_session(const LinkOptions& options) {
@@ -52,11 +83,16 @@ Result<StageSession> open_session(const LinkOptions& options) {
                         stage->cameras.size()));
     const std::string source = options.camera.empty() ? stage->cameras[0].source : options.camera;
     if (source.empty()) return fail("which camera? give --camera, or a source in the stage's [[camera]]");
-    auto camera = open_camera(source);
-    if (!camera.ok()) return camera.error();
-    auto board = open_board(options, *stage);
-    if (!board.ok()) return board.error();
-    return StageSession{std::move(*stage), std::make_unique<Board>(std::move(*board)), std::move(*camera)};
+    const std::string link = board_link(options, *stage);
+    if (link.empty()) return which_board();
+    // Both anew at each try: a ring that an earlier virtual stage left behind is not the one that comes with the board.
+    return open_within(options.wait_s, [&]() -> Result<StageSession> {
+        auto camera = open_camera(source);
+        if (!camera.ok()) return camera.error();
+        auto board = connect_board(link);
+        if (!board.ok()) return board.error();
+        return StageSession{*stage, std::make_unique<Board>(std::move(*board)), std::move(*camera)};
+    });
 }
 
 const std::atomic<bool>& stop_on_signal() {

@@ -13,9 +13,10 @@
 
 namespace ols {
 
-// --stage, --board and --camera.
+// --stage, --board, --camera and --wait.
 struct LinkOptions {
     std::string stage_path, board, camera;
+    double wait_s = 0;
 
     void add_to(CLI::App& verb, bool with_camera);
 };
@@ -29,7 +30,7 @@ struct StageSession {
 // The default stage without --stage.
 Result<StageConfig> open_stage(const LinkOptions& options);
 
-// Options win over stage.toml. Errors say which of them is missing.
+// Options win over stage.toml. Errors say which of them is missing. What is not there yet is tried again until wait_s is over.
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage);
 Result<StageSession> open_session(const LinkOptions& options);
 

@@ -17,7 +17,8 @@ import checks
 import moving
 import noise
 import numpy as np
-from session import BIN, ROOT, Clock, VirtualStage, run, run_json, use_root
+from PIL import Image
+from session import BIN, ROOT, Chapters, Clock, VirtualStage, run, run_json, use_root
 
 STAGES = {"noisy": "tools/demo/stage.toml", "clean": "tools/demo/stage_clean.toml"}
 HEAD = "tools/stagesim/scenes/head.toml"
@@ -25,6 +26,7 @@ CARD = "tools/stagesim/scenes/card.toml"
 CARD_REFLECTANCE = 0.985
 # Of .cache/assets/env: exposure in stops, turn about the vertical in degrees.
 ENVIRONMENTS = {"courtyard": (0.2, 0), "city": (0.4, 0), "sunset": (1.3, 120)}
+HEAD_BOX = (140, 40, 500, 480)  # of a relit picture: left, top, right, bottom
 TRUTH_ENVIRONMENT = "sunset"
 COMPARED = ["single", "hadamard156"]  # bases whose pictures are held against the truth
 OTHERS = ["triangle", "triangle300", "planes156", "s155", "paley163", "spherical_harmonics:10"]  # recorded by name, without a sequence file
@@ -57,8 +59,7 @@ class Demo:
         name = basis.replace(":", "_")
         return self.out / (f"{name}.rfa" if model == "noisy" else f"{name}_{model}.rfa")
 
-    def record(self, model):
-        """Calibrates on the white card, then records the head once in each basis."""
+    def calibrate(self, model):
         settings, options = STAGES[model], ["--camera-model", MODELS[model]]
         calibration = self.out / f"calibration_{model}"
         with self.clock(f"calibrate on the white card ({model} camera)"):
@@ -67,39 +68,56 @@ class Demo:
                 cycles = [] if model == "noisy" else ["--cycles", 2]
                 run(BIN / "stagectl", "calibrate", "--stage", settings, *stage.devices(), "--card", CARD_REFLECTANCE,
                     *cycles, "-o", calibration)
-        bases = [SHOWN, *COMPARED] if model == "noisy" else COMPARED
-        trace = ["--vcd", self.out / "board.vcd"] if model == "noisy" else []
-        with self.clock(f"render the head under every lamp ({model} camera)"):
-            stage = VirtualStage(HEAD, settings, self.out / f"stage/head_{model}", *options, *trace).__enter__()
-        for basis in bases:
-            with self.clock(f"record {basis} ({model} camera)"):
-                account = stage.work / f"{basis}.account.jsonl"
-                self.takes[basis, model] = run_json(
-                    BIN / "stagectl", "run", "--sequence", sequence_file(basis), "--stage", settings, *stage.devices(),
-                    "--calibration", calibration, "--production", "demo", "--scene", "head", "--take", basis,
-                    "--timecode", "01:00:00:00", "--cycles", CYCLES[model], "--frames", account,
-                    *masked_samples(basis), "-o", self.path(basis, model), "--json")
-                self.takes[basis, model]["account"] = account
-        stage.__exit__()
+    def render_head(self, model, name, *options):
+        with self.clock(f"render the head under every lamp ({name})"):
+            return VirtualStage(HEAD, STAGES[model], self.out / f"stage/head_{name.replace(' ', '_')}",
+                                "--camera-model", MODELS[model], *options).__enter__()
 
-    def record_others(self):
-        """One noisy cycle in each basis that has no example of its own, on a stage of their own: its trace would be long."""
-        with self.clock("render the head under every lamp (other bases)"):
-            stage = VirtualStage(HEAD, STAGES["noisy"], self.out / "stage/head_bases", "--camera-model", "on").__enter__()
+    def record(self, stage, basis, model):
+        with self.clock(f"record {basis} ({model} camera)"):
+            account = stage.work / f"{basis}.account.jsonl"
+            self.takes[basis, model] = run_json(
+                BIN / "stagectl", "run", "--sequence", sequence_file(basis), "--stage", STAGES[model], *stage.devices(),
+                "--calibration", self.out / f"calibration_{model}", "--production", "demo", "--scene", "head", "--take", basis,
+                "--timecode", "01:00:00:00", "--cycles", CYCLES[model], "--frames", account,
+                *masked_samples(basis), "-o", self.path(basis, model), "--json")
+            self.takes[basis, model]["account"] = account
+
+    def first_picture(self):
+        """The still head, as README's "Using it" records it; its stage stays up for the other bases."""
+        self.calibrate("noisy")
+        self.head = self.render_head("noisy", "noisy camera", "--vcd", self.out / "board.vcd")
+        self.record(self.head, SHOWN, "noisy")
+        self.relight()
+
+    def record_bases(self):
+        """The head in the bases that are compared, with and without noise, and one noisy cycle in each basis that has no example
+        of its own, on a stage of their own: its trace would be long."""
+        for basis in COMPARED:
+            self.record(self.head, basis, "noisy")
+        self.head.__exit__()
+        self.calibrate("clean")
+        stage = self.render_head("clean", "clean camera")
+        for basis in COMPARED:
+            self.record(stage, basis, "clean")
+        stage.__exit__()
+        stage = self.render_head("noisy", "other bases")
         for basis in OTHERS:
             with self.clock(f"record {basis}"):
                 run(BIN / "stagectl", "run", "--basis", basis, "--stage", STAGES["noisy"], *stage.devices(), "--calibration",
                     self.out / "calibration_noisy", *masked_samples(basis), "-o", self.path(basis, "noisy"))
         stage.__exit__()
 
-    def show(self):
+    def relight(self):
         take = self.path(SHOWN, "noisy")
-        with self.clock("contact sheet"):
-            run(BIN / "rf", "export", take, "--contact-sheet", self.out / "contact-sheet.png")
         with self.clock("relight under three environments"):
             for name, (stops, degrees) in ENVIRONMENTS.items():
                 run(BIN / "rf", "relight", take, "--env", environment(name), "--exposure", stops, "--rotate", degrees,
                     "-o", self.out / f"relit_{name}.exr", "--png", self.out / f"relit_{name}.png")
+        heads = [Image.open(self.out / f"relit_{name}.png").convert("RGB").crop(HEAD_BOX) for name in ENVIRONMENTS]
+        moving.beside(heads).save(self.out / "demo.jpg", quality=90, subsampling=0)
+        with self.clock("contact sheet"):
+            run(BIN / "rf", "export", take, "--contact-sheet", self.out / "contact-sheet.png")
 
     def move(self):
         """A moving head, with motion compensation and without."""
@@ -194,18 +212,23 @@ def main():
     (out / "report.json").write_text("{}\n")
 
     demo = Demo(out)
-    for model in MODELS:
-        demo.record(model)
-    demo.record_others()
-    demo.show()
-    report = {**demo.check(), **demo.compare(), **demo.move(), "noise": demo.predict_noise()}
+    report = {}
+    # What is worth looking at first comes first; minutes are those of two cores that nobody else uses.
+    chapters = Chapters([
+        ("the still head, recorded in s159 and relit", 1, demo.first_picture, "demo.jpg, relit_*.png, contact-sheet.png"),
+        ("the still head in other bases", 2, demo.record_bases, None),
+        ("is every label, edge and archive right?", 1, lambda: report.update(demo.check()), None),
+        ("the bases against the truth", 2, lambda: report.update(demo.compare()), "bases.png"),
+        ("noise against its model", 1, lambda: report.update(noise=demo.predict_noise()), None),
+        ("the moving head, with and without compensation, every frame rendered", 12, lambda: report.update(demo.move()),
+         "moving.gif, moving.jpg; for motion blur moving/blurred_*.png"),
+    ], options.out)
+    chapters.play()
     report["seconds"] = round(demo.clock.total(), 1)
     report["seconds_by_step"] = demo.clock.steps
     (out / "report.json").write_text(json.dumps(report, indent=1) + "\n")
     (out / "report.txt").write_text(text_report(report))
     print(text_report(report))
-    print(f"Look at {options.out}/contact-sheet.png, {options.out}/relit_*.png, {options.out}/moving.gif and moving.jpg, "
-          "and for motion blur at moving/blurred_*.png")
 
 
 if __name__ == "__main__":

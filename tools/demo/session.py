@@ -39,6 +39,30 @@ class _Step:
         self.clock.steps[self.name] = round(self.clock.steps.get(self.name, 0) + spent, 2)
 
 
+class Chapters:
+    """What the demo does, in order: (what, minutes, how, pictures to look at or None), told before, between and after."""
+
+    def __init__(self, chapters, out):
+        self.chapters, self.out = chapters, out
+
+    def play(self):
+        print("The demo has these parts (minutes on two cores that nobody else uses):", flush=True)
+        self.tell(0)
+        for number, (what, _, how, pictures) in enumerate(self.chapters):
+            print(f"\n{number + 1} of {len(self.chapters)}: {what}", flush=True)
+            how()
+            if pictures:
+                print(f"LOOK in {self.out}: {pictures}", flush=True)
+            if number + 1 < len(self.chapters):
+                print("Still to come (Ctrl-C leaves what is there):", flush=True)
+                self.tell(number + 1)
+
+    def tell(self, first):
+        for number, (what, minutes, _, pictures) in enumerate(self.chapters[first:], first + 1):
+            shown = f": {pictures}" if pictures else ""
+            print(f"  {number}. some {minutes} min  {what}{shown}", flush=True)
+
+
 def run(*command):
     """Runs a program of the project and returns what it printed; on failure, ends the demo with its own words. On a terminal its
     progress shows."""

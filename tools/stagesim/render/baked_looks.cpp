@@ -51,7 +51,11 @@ void BakedLooks::evaluate(const SurfaceHit& hit, Lattice& lattice) const {
 Look BakedLooks::at(const SurfaceHit& hit) {
     if (lattices_[hit.object].empty()) return look_of(scene_.materials[hit.material], hit.rest_position, hit.mask);
     Lattice& lattice = lattices_[hit.object][hit.triangle];
-    std::call_once(lattice.evaluated, [&] { evaluate(hit, lattice); });
+    if (!lattice.is_evaluated.load(std::memory_order_acquire))
+        std::call_once(lattice.once, [&] {
+            evaluate(hit, lattice);
+            lattice.is_evaluated.store(true, std::memory_order_release);
+        });
 
     // The small triangle of the lattice: one that stands as the large one does, or one upside down.
     const int steps = lattice.steps;

@@ -2,6 +2,7 @@
 // Looks of meshes, evaluated once on a fine lattice and interpolated: a moving subject shows the same skin in every frame.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -24,8 +25,9 @@ class BakedLooks {
 
   private:
     struct Lattice {
-        std::once_flag evaluated;
-        int steps = 1;            // along each side
+        std::once_flag once;
+        std::atomic<bool> is_evaluated = false;  // read at every hit: call_once costs as much as the look
+        int steps = 1;                           // along each side
         std::vector<Look> looks;  // row j (weight of the third corner j / steps) has steps + 1 - j of them
     };
     void evaluate(const SurfaceHit& hit, Lattice& lattice) const;

@@ -14,23 +14,42 @@ namespace {
 // Direct light of a lamp at infinity. The matte board's lamps light the board only; the sphere's light everything but
 // the board, unless stray light is called for.
 void start(LightPacket& packet, bool sphere_lights_board) {
-    const VisiblePoints& points = packet.points;
+    const Lanes3 normal = lanes_of(packet.points.normal, packet.first);
+    const uint8_t* on_board = packet.points.on_board.data() + packet.first;
     const Float3 l = packet.lamp.direction;
+    const bool matte = packet.lamp.matte;
+    Lanes receives, irradiance;
+    for (int i = 0; i < packet_size; ++i)
+        receives[i] = (matte ? on_board[i] != 0 : on_board[i] == 0 || sphere_lights_board) ? 1.0f : 0.0f;
     for (int i = 0; i < packet_size; ++i) {
-        const uint32_t p = packet.first + i;
-        const bool receives =
-            packet.lamp.matte ? points.on_board[p] != 0 : points.on_board[p] == 0 || sphere_lights_board;
-        packet.receives[i] = receives ? 1.0f : 0.0f;
-        packet.to_lamp[0][i] = l.x, packet.to_lamp[1][i] = l.y, packet.to_lamp[2][i] = l.z;
-        packet.distance_m[i] = std::numeric_limits<float>::infinity();
-        const float cosine = l.x * points.normal[0][p] + l.y * points.normal[1][p] + l.z * points.normal[2][p];
-        packet.irradiance[i] = packet.receives[i] * std::max(0.0f, cosine);
+        const float cosine = l.x * normal[0][i] + l.y * normal[1][i] + l.z * normal[2][i];
+        irradiance[i] = receives[i] * std::max(0.0f, cosine);
     }
+    packet.receives = receives, packet.irradiance = irradiance;
+    std::fill_n(packet.to_lamp[0].at, packet_size, l.x);
+    std::fill_n(packet.to_lamp[1].at, packet_size, l.y);
+    std::fill_n(packet.to_lamp[2].at, packet_size, l.z);
+    std::fill_n(packet.distance_m.at, packet_size, std::numeric_limits<float>::infinity());
+}
+
+void reflect_diffusely(LightPacket& packet) {
+    if (!packet.is_lit()) {
+        packet.reflected = {};
+        return;
+    }
+    const Lanes3 albedo = lanes_of(packet.points.albedo, packet.first);
+    const Lanes irradiance = packet.irradiance;
+    Lanes3 reflected;
+    for (int c = 0; c < 3; ++c)
+        for (int i = 0; i < packet_size; ++i) reflected[c][i] = albedo[c][i] * irradiance[i];
+    packet.reflected = reflected;
 }
 
 bool is_dark(const LightPacket& packet) {
-    return std::all_of(&packet.reflected[0][0], &packet.reflected[0][0] + 3 * packet_size,
-                       [](float r) { return r == 0; });
+    bool dark = true;
+    for (const Lanes& color : packet.reflected)
+        for (const float r : color.at) dark &= r == 0;
+    return dark;
 }
 
 }  // namespace
@@ -55,7 +74,10 @@ void LampImages::render_chunk(const VisiblePoints::Chunk& chunk, const std::vect
                               const EffectSet& effects) {
     const bool sphere_lights_board = effects.active("stray");
     std::vector<uint64_t> arriving(effects.arriving().size(), 0), reflecting(effects.reflecting().size(), 0);
-    std::vector<float> colors(size_t(chunk.pixels) * 3);
+    const Mosaic* mosaic = effects.mosaic();
+    const std::vector<uint8_t> kept =
+        mosaic && mosaic->keeps_one_color() ? kept_colors(chunk, *mosaic) : std::vector<uint8_t>();
+    std::vector<float> colors(mosaic && kept.empty() ? size_t(chunk.pixels) * 3 : 0);  // of which the mean is kept
     std::vector<LightPacket> packets;
     packets.reserve(chunk.points / packet_size);
     for (const uint32_t lamp : todo) {
@@ -65,33 +87,40 @@ void LampImages::render_chunk(const VisiblePoints::Chunk& chunk, const std::vect
             start(packets.back(), sphere_lights_board);
         }
         for (size_t e = 0; e < arriving.size(); ++e) arriving[e] += effects.arriving()[e]->apply(packets);
-        for (LightPacket& packet : packets)
-            for (int c = 0; c < 3; ++c)
-                for (int i = 0; i < packet_size; ++i)
-                    packet.reflected[c][i] = points_.albedo[c][packet.first + i] * packet.irradiance[i];
+        for (LightPacket& packet : packets) reflect_diffusely(packet);
         for (size_t e = 0; e < reflecting.size(); ++e) reflecting[e] += effects.reflecting()[e]->apply(packets);
         std::fill(colors.begin(), colors.end(), 0.0f);
-        for (const LightPacket& packet : packets) {
-            if (is_dark(packet)) continue;
-            for (int i = 0; i < packet_size; ++i)
-                for (int c = 0; c < 3; ++c)
-                    colors[(points_.pixel[packet.first + i] - chunk.first_pixel) * 3 + c] +=
-                        points_.weight[packet.first + i] * packet.reflected[c][i];
-        }
-        float* image = images_[lamp].data() + size_t(chunk.first_pixel) * channels_;
-        if (channels_ == 3) {
-            std::copy(colors.begin(), colors.end(), image);
-            continue;
-        }
-        for (uint32_t i = 0; i < chunk.pixels; ++i) {
-            const uint32_t pixel = points_.pixels[chunk.first_pixel + i];
-            const float rgb[3] = {colors[3 * i], colors[3 * i + 1], colors[3 * i + 2]};
-            image[i] = effects.mosaic()->keep(rgb, int(pixel % points_.width), int(pixel / points_.width));
-        }
-        effects.mosaic()->count(chunk.pixels);
+        float* image = images_[lamp].data() + size_t(chunk.first_pixel) * size_t(channels_);
+        for (const LightPacket& packet : packets)
+            if (!is_dark(packet)) add_light(packet, chunk, kept, colors.empty() ? image : colors.data());
+        for (size_t i = 0; i < colors.size(); i += 3) image[i / 3] = (colors[i] + colors[i + 1] + colors[i + 2]) / 3;
     }
+    if (effects.mosaic()) effects.mosaic()->count(uint64_t(chunk.pixels) * todo.size());
     for (size_t e = 0; e < arriving.size(); ++e) effects.arriving()[e]->count(arriving[e]);
     for (size_t e = 0; e < reflecting.size(); ++e) effects.reflecting()[e]->count(reflecting[e]);
+}
+
+// Of each point of a chunk, the colour that its pixel sees.
+std::vector<uint8_t> LampImages::kept_colors(const VisiblePoints::Chunk& chunk, const Mosaic& mosaic) const {
+    std::vector<uint8_t> kept(chunk.points);
+    for (uint32_t i = 0; i < chunk.points; ++i) {
+        const int pixel = int(points_.pixels[points_.pixel[chunk.first_point + i]]);
+        kept[i] = uint8_t(mosaic.color_at(pixel % points_.width, pixel / points_.width));
+    }
+    return kept;
+}
+
+// Adds a packet to its chunk's pixels: one colour each, or, where `kept` names none, all three.
+void LampImages::add_light(const LightPacket& packet, const VisiblePoints::Chunk& chunk,
+                           const std::vector<uint8_t>& kept, float* sums) const {
+    for (uint32_t i = 0; i < packet_size; ++i) {
+        const uint32_t p = packet.first + i, pixel = points_.pixel[p] - chunk.first_pixel;
+        const float weight = points_.weight[p];
+        if (!kept.empty())
+            sums[pixel] += weight * packet.reflected[kept[p - chunk.first_point]][int(i)];
+        else
+            for (uint32_t c = 0; c < 3; ++c) sums[3 * pixel + c] += weight * packet.reflected[c][int(i)];
+    }
 }
 
 void LampImages::add_weighted(const std::vector<Float3>& weights, Image& sum) const {

@@ -28,6 +28,9 @@ class LampImages {
   private:
     void render_chunk(const VisiblePoints::Chunk& chunk, const std::vector<uint32_t>& todo,
                       const std::vector<PlacedLamp>& lamps, const Geometry& geometry, const EffectSet& effects);
+    std::vector<uint8_t> kept_colors(const VisiblePoints::Chunk& chunk, const Mosaic& mosaic) const;
+    void add_light(const LightPacket& packet, const VisiblePoints::Chunk& chunk, const std::vector<uint8_t>& kept,
+                   float* sums) const;
 
     VisiblePoints points_;
     int channels_;

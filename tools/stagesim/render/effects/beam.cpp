@@ -14,16 +14,18 @@ std::string Beam::caller(const Setup& setup) const {
 }
 
 uint32_t Beam::apply_packet(LightPacket& packet) const {
-    const VisiblePoints& points = packet.points;
-    const PlacedLamp& lamp = packet.lamp;
+    if (!packet.is_lit()) return 0;
+    const Lanes3 position = lanes_of(packet.points.position, packet.first);
+    const Float3 at = packet.lamp.position_m, axis = packet.lamp.direction;
+    Lanes cosine;
+    for (int i = 0; i < packet_size; ++i) {
+        const Float3 from_lamp = Float3{position[0][i], position[1][i], position[2][i]} - at;
+        cosine[i] = -dot(from_lamp, axis) / length(from_lamp);
+    }
     uint32_t evaluations = 0;
     for (int i = 0; i < packet_size; ++i) {
         if (packet.irradiance[i] <= 0) continue;
-        const uint32_t p = packet.first + i;
-        const Float3 from_lamp =
-            Float3{points.position[0][p], points.position[1][p], points.position[2][p]} - lamp.position_m;
-        const float cosine = -dot(from_lamp, lamp.direction) / length(from_lamp);
-        packet.irradiance[i] *= std::pow(std::max(0.0f, cosine), lamp.beam_exponent);
+        packet.irradiance[i] *= std::pow(std::max(0.0f, cosine[i]), packet.lamp.beam_exponent);
         ++evaluations;
     }
     return evaluations;

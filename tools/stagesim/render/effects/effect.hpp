@@ -4,6 +4,7 @@
 // disabled. To add one: derive, and list it in effect_set.cpp.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -42,6 +43,26 @@ class Effect {
     std::atomic<uint64_t> evaluations_ = 0;
 };
 
+// One value for each point of a packet. Loops over packets work on these rather than on the arrays they come from: the compiler
+// then knows that what it writes is not what it reads, and makes vector instructions of them.
+struct Lanes {
+    alignas(32) float at[packet_size];
+
+    static Lanes of(const std::vector<float>& values, uint32_t first) {
+        Lanes lanes;
+        std::copy_n(values.data() + first, packet_size, lanes.at);
+        return lanes;
+    }
+    float operator[](int i) const { return at[i]; }
+    float& operator[](int i) { return at[i]; }
+};
+
+// Of three coordinates or colours.
+using Lanes3 = std::array<Lanes, 3>;
+inline Lanes3 lanes_of(const std::vector<float> (&values)[3], uint32_t first) {
+    return {Lanes::of(values[0], first), Lanes::of(values[1], first), Lanes::of(values[2], first)};
+}
+
 // One lamp's light on one packet of points on its way to the camera.
 struct LightPacket {
     const VisiblePoints& points;
@@ -51,13 +72,20 @@ struct LightPacket {
     const Geometry& geometry;
 
     // 1 where the lamp is meant to light the point at all, 0 elsewhere (board lamps and subject).
-    alignas(32) float receives[packet_size];
+    Lanes receives;
     // Set up for a lamp at infinity: direction and cosine only.
-    alignas(32) float to_lamp[3][packet_size];  // unit
-    alignas(32) float distance_m[packet_size];
-    alignas(32) float irradiance[packet_size];  // on the surface, in units of the lamp's at its aim, facing it
+    Lanes3 to_lamp;  // unit
+    Lanes distance_m;
+    Lanes irradiance;  // on the surface, in units of the lamp's at its aim, facing it
     // pi L / E: what the camera sees, in units of a white matte surface facing the lamp at its aim.
-    alignas(32) float reflected[3][packet_size];
+    Lanes3 reflected;
+
+    // Whether the lamp's own light arrives at any of the points: about half of all packets face away.
+    bool is_lit() const {
+        bool lit = false;
+        for (const float e : irradiance.at) lit |= !(e <= 0);
+        return lit;
+    }
 };
 
 // Light from lamp to camera. `prepare` is called once for a scene at one moment; `apply` then from many threads.

@@ -14,20 +14,24 @@ std::string Falloff::caller(const Setup& setup) const {
 }
 
 uint32_t Falloff::apply_packet(LightPacket& packet) const {
-    const VisiblePoints& points = packet.points;
-    const PlacedLamp& lamp = packet.lamp;
+    const Lanes3 position = lanes_of(packet.points.position, packet.first),
+                 normal = lanes_of(packet.points.normal, packet.first);
+    const Lanes receives = packet.receives;
+    const Float3 at = packet.lamp.position_m;
+    const float reach_m = packet.lamp.reach_m;
+    Lanes3 to_lamp;
+    Lanes distance_m, irradiance;
     for (int i = 0; i < packet_size; ++i) {
-        const uint32_t p = packet.first + i;
-        const float x = lamp.position_m.x - points.position[0][p], y = lamp.position_m.y - points.position[1][p],
-                    z = lamp.position_m.z - points.position[2][p];
+        const float x = at.x - position[0][i], y = at.y - position[1][i], z = at.z - position[2][i];
         const float squared = x * x + y * y + z * z, distance = std::sqrt(squared), inverse = 1 / distance;
-        packet.to_lamp[0][i] = x * inverse;
-        packet.to_lamp[1][i] = y * inverse;
-        packet.to_lamp[2][i] = z * inverse;
-        packet.distance_m[i] = distance;
-        const float cosine = (x * points.normal[0][p] + y * points.normal[1][p] + z * points.normal[2][p]) * inverse;
-        packet.irradiance[i] = packet.receives[i] * std::max(0.0f, cosine) * lamp.reach_m * lamp.reach_m / squared;
+        to_lamp[0][i] = x * inverse;
+        to_lamp[1][i] = y * inverse;
+        to_lamp[2][i] = z * inverse;
+        distance_m[i] = distance;
+        const float cosine = (x * normal[0][i] + y * normal[1][i] + z * normal[2][i]) * inverse;
+        irradiance[i] = receives[i] * std::max(0.0f, cosine) * reach_m * reach_m / squared;
     }
+    packet.to_lamp = to_lamp, packet.distance_m = distance_m, packet.irradiance = irradiance;
     return packet_size;
 }
 

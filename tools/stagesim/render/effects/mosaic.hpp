@@ -13,11 +13,9 @@ class Mosaic : public Effect {
     const char* evaluation() const override { return "pixel and lamp"; }
     std::string caller(const Setup& setup) const override;
 
-    // What pixel (x, y) keeps of its colour.
-    float keep(const float (&rgb)[3], int x, int y) const {
-        if (cfa_ == Cfa::none) return (rgb[0] + rgb[1] + rgb[2]) / 3;
-        return rgb[cfa_color(cfa_, x, y)];
-    }
+    // Whether a pixel keeps one of its colours, color_at(x, y); else it keeps their mean.
+    bool keeps_one_color() const { return cfa_ != Cfa::none; }
+    int color_at(int x, int y) const { return cfa_color(cfa_, x, y); }
 
   private:
     Cfa cfa_;

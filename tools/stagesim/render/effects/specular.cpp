@@ -27,24 +27,32 @@ float ggx(float n_h, float n_l, float n_v, float h_v, float alpha, float f0) {
 }
 
 uint32_t Specular::apply_packet(LightPacket& packet) const {
-    const VisiblePoints& points = packet.points;
-    uint32_t evaluations = 0;
+    if (!packet.is_lit()) return 0;
+    const Lanes3 normal = lanes_of(packet.points.normal, packet.first),
+                 view = lanes_of(packet.points.view, packet.first), to_lamp = packet.to_lamp;
+    const Lanes roughness = Lanes::of(packet.points.roughness, packet.first),
+                f0 = Lanes::of(packet.points.f0, packet.first), irradiance = packet.irradiance;
+    Lanes lobe;
+    // Of unlit points too, whose lobe may be anything: they are left out below.
     for (int i = 0; i < packet_size; ++i) {
-        const uint32_t p = packet.first + i;
-        if (packet.irradiance[i] <= 0 || points.f0[p] <= 0) continue;
-        const Float3 n{points.normal[0][p], points.normal[1][p], points.normal[2][p]};
-        const Float3 v{points.view[0][p], points.view[1][p], points.view[2][p]};
-        const Float3 l{packet.to_lamp[0][i], packet.to_lamp[1][i], packet.to_lamp[2][i]};
+        const Float3 n{normal[0][i], normal[1][i], normal[2][i]};
+        const Float3 v{view[0][i], view[1][i], view[2][i]};
+        const Float3 l{to_lamp[0][i], to_lamp[1][i], to_lamp[2][i]};
         const Float3 h = normalized(l + v);
         // Interpolated normals may turn away from the camera at the silhouette: keep them just visible.
         const float n_v = std::max(dot(n, v), 1e-3f), n_l = std::max(dot(n, l), 1e-3f);
         const float n_h = std::clamp(dot(n, h), 0.0f, 1.0f), h_v = std::clamp(dot(h, v), 0.0f, 1.0f);
-        const float alpha = points.roughness[p] * points.roughness[p];
-        const float lobe =
-            std::numbers::pi_v<float> * ggx(n_h, n_l, n_v, h_v, alpha, points.f0[p]) * packet.irradiance[i];
-        for (auto& channel : packet.reflected) channel[i] += lobe;
-        ++evaluations;
+        const float alpha = roughness[i] * roughness[i];
+        lobe[i] = std::numbers::pi_v<float> * ggx(n_h, n_l, n_v, h_v, alpha, f0[i]) * irradiance[i];
     }
+    uint32_t evaluations = 0;
+    for (int i = 0; i < packet_size; ++i) {
+        const bool counts = !(irradiance[i] <= 0) & !(f0[i] <= 0);
+        lobe[i] = counts ? lobe[i] : 0;
+        evaluations += counts;
+    }
+    for (Lanes& channel : packet.reflected)
+        for (int i = 0; i < packet_size; ++i) channel[i] += lobe[i];
     return evaluations;
 }
 
