@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -48,8 +47,7 @@ int run_program(CLI::App& app, int argc, char** argv, const int& exit_code) {
     std::signal(SIGXFSZ, SIG_IGN);
     app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), version), "say which version this is");
     const int code = parse(app, argc, argv, exit_code);
-    std::cout.flush();
-    errno = 0;
+    errno = 0;  // std::cout, which CLI11 prints help to, keeps nothing back from stdout
     const bool flushed = std::fflush(stdout) == 0;
     const int error = errno;
     if (flushed && !std::ferror(stdout)) return code;

@@ -3,11 +3,13 @@
 sample of the archive differs from the take without faults but where the manifest says so. The virtual camera's noise is
 keyed by trigger, so that a mislabelled frame cannot hide."""
 import json
+import subprocess
 
 import numpy as np
 import pytest
 
 from virtual_take import (
+    BIN,
     VirtualStage,
     identification,
     manifest,
@@ -45,6 +47,11 @@ def record(folder, faults, *stage_options, basis="single", cycles=CYCLES, code=0
             code=code,
         )
     return archive, report
+
+
+def relight(archive, output, *options):
+    command = [BIN / "rf", "relight", archive, "--light", "0 0 1 1 1 1", "-o", output, "--json", *options]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=True)
 
 
 @pytest.fixture(scope="module")
@@ -183,6 +190,9 @@ def test_hadamard156_refuses_a_lost_slot_by_name_or_estimates_it_or_takes_it_fro
     archive, report = record(tmp_path / "estimated", faults, basis="hadamard156", code=2, run_options=options)
     assert report["targets_written"] == CYCLES and report["estimated_share"] == 1
     assert (read_plane(archive, 1, "mask") & 16 == 16).all()
+    relit = relight(archive, tmp_path / "relit.exr", "--target", 1)
+    masked = json.loads(relit.stdout)["targets"][0]["masked_pixels"]
+    assert masked["estimated"] == masked["pixels"] > 0 and "are estimates" in relit.stderr
     estimated = target_provenance(archive, 1)["masked"]["estimated"]
     assert estimated["prior"] == "smooth" and 0 < estimated["mean_bias"] <= estimated["worst_bias"]
 

@@ -122,7 +122,7 @@ def test_what_does_not_fit_on_a_full_disk_is_an_error(verb, options, files, tmp_
 def test_help_and_version_that_do_not_arrive_are_an_error(program, flag):
     with open("/dev/full", "w") as full:
         done = run(program, flag, stdout=full)
-    assert done.returncode == 1 and "what was printed did not all arrive: No space left" in done.stderr
+    assert done.returncode == 1 and "what was printed did not all arrive" in done.stderr
 
 
 def test_with_standard_output_closed_nothing_is_printed_into_a_file(files, tmp_path):
