@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Lighting bases: how bright each lamp is in each basis row, and how the rows are inverted to images of single lamps.
+// To add one: a line in basis_kinds() and its rows in find_basis() (basis.cpp), or a file (basis_file.hpp).
 #pragma once
 
 #include <cstdint>
