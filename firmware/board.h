@@ -18,6 +18,7 @@ enum board_stop_input { BOARD_EMERGENCY_STOP, BOARD_OVER_TEMPERATURE, BOARD_OPEN
 #ifndef BOARD_CAN_NUMBER
 #define BOARD_CAN_NUMBER 0
 #endif
+#define BOARD_CAN_IDS (16 * BOARD_CAN_NUMBER)  // what this board adds to the identifiers of wire.h
 #ifndef BOARD_CAN_KBIT_S
 #define BOARD_CAN_KBIT_S 1000
 #endif

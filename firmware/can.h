@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// CAN: the transport of transport.h by ISO-TP, and what the board tells everybody on the bus (PROTOCOL.md, "CAN").
+// CAN: the transport of transport.h by ISO-TP (PROTOCOL.md, "CAN"); can_news.h has what the board tells everybody on the bus.
 #ifndef OLS_CAN_H
 #define OLS_CAN_H
 
