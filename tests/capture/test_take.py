@@ -107,6 +107,10 @@ def test_ctrl_c_stops_the_light_and_finishes_the_archive(tmp_path):
         assert stage.stagectl("status", "--json", camera=False)["state"] != "playing"
     checked = verify(archive)
     assert checked.returncode == 0, checked.stdout
+    # What was never played is one line, with the reason.
+    assert "to 1999: no frame of it was recorded: the take was stopped" in checked.stdout
+    intact = sum(line.startswith("ok") for line in checked.stdout.splitlines())
+    assert len(checked.stdout.splitlines()) < intact + 6, checked.stdout
 
 
 def test_kill_9_at_random_moments_leaves_what_was_finished(tmp_path):
