@@ -2,6 +2,8 @@
 // Camera over RingReader. The program that fills the ring has set its camera up; here that is only checked.
 #include "device/ring_camera.hpp"
 
+#include <chrono>
+
 #include "device/delivery_count.hpp"
 #include "device/ring.hpp"
 
@@ -35,12 +37,19 @@ class RingCamera : public Camera {
     void stop() override { ring_.stop(); }
 
     std::optional<Frame> read(int timeout_ms) override {
-        while (auto frame = ring_.read(timeout_ms)) {
-            if (!delivery_.take(frame->stamp)) continue;
-            frame->camera = index_;
-            return frame;
+        using Clock = std::chrono::steady_clock;
+        const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
+        // Stale frames do not prolong the wait, be there ever so many.
+        for (auto left = std::chrono::milliseconds(timeout_ms);;) {
+            auto frame = ring_.read(int(left.count()));
+            if (!frame) return std::nullopt;
+            if (delivery_.take(frame->stamp)) {
+                frame->camera = index_;
+                return frame;
+            }
+            left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
+            if (left.count() < 0) return std::nullopt;
         }
-        return std::nullopt;
     }
 
     uint64_t watermark_ns() const override { return ring_.watermark_ns(); }

@@ -112,27 +112,52 @@ TEST(DeliveryCount, frames_from_before_the_start_are_stale_until_one_of_after_it
     EXPECT_EQ(count.counts().missing_ids, 0u);
 }
 
-TEST(RingCamera, a_frame_that_the_program_delivers_after_the_start_but_exposed_before_is_stale) {
-    const std::string path = testing::TempDir() + "stale.ring";
-    auto writer = RingWriter::create(path, 4, ring_content_of(RingRig().fitting_setup()));
-    auto camera = open_ring_camera(path, 0);
-    ASSERT_TRUE(writer.ok() && camera.ok());
-    std::thread program([&] {
-        while (!writer->start_asked()) std::this_thread::yield();
-        writer->confirm_start(*writer->start_asked(), 5000);
-    });
-    ASSERT_TRUE((*camera)->start().ok());
-    program.join();
-    Frame frame;
-    frame.width = 16, frame.height = 8, frame.pitch_bytes = 32, frame.samples.resize(256);
-    const std::atomic<bool> never{false};
-    for (const uint64_t time_ns : {4998, 4999, 5000}) {
-        frame.stamp = {time_ns, time_ns};
-        ASSERT_EQ(writer->write(frame, false, never), RingWriter::Outcome::written);
+// A ring in this process, whose program says that the camera's time at the start was 5000.
+class RingOfStaleFrames : public testing::Test {
+  protected:
+    void SetUp() override {
+        const std::string path = testing::TempDir() + "stale" + std::to_string(getpid()) + ".ring";
+        auto writer = RingWriter::create(path, 4, ring_content_of(RingRig().fitting_setup()));
+        auto camera = open_ring_camera(path, 0);
+        ASSERT_TRUE(writer.ok() && camera.ok());
+        writer_.emplace(std::move(*writer));
+        camera_ = std::move(*camera);
+        std::thread program([&] {
+            while (!writer_->start_asked()) std::this_thread::yield();
+            writer_->confirm_start(*writer_->start_asked(), 5000);
+        });
+        EXPECT_EQ(camera_->start().value(), 5000u);
+        program.join();
+        std::filesystem::remove(path);
     }
-    EXPECT_EQ((*camera)->read(0)->stamp.timestamp_ns, 5000u);
-    EXPECT_EQ((*camera)->counts().stale, 2u);
-    EXPECT_EQ((*camera)->counts().missing_ids, 0u);
+    RingWriter::Outcome write(uint64_t time_ns, const std::atomic<bool>& cancelled) {
+        Frame frame;
+        frame.width = 16, frame.height = 8, frame.pitch_bytes = 32, frame.samples.resize(256);
+        frame.stamp = {time_ns, time_ns};
+        return writer_->write(frame, true, cancelled);
+    }
+
+    std::optional<RingWriter> writer_;
+    std::unique_ptr<Camera> camera_;
+};
+
+TEST_F(RingOfStaleFrames, those_exposed_before_the_start_are_passed_over_and_not_counted_as_lost) {
+    const std::atomic<bool> never{false};
+    for (const uint64_t time_ns : {4998, 4999, 5000}) ASSERT_EQ(write(time_ns, never), RingWriter::Outcome::written);
+    EXPECT_EQ(camera_->read(surely_ms)->stamp.timestamp_ns, 5000u);
+    EXPECT_EQ(camera_->counts().stale, 2u);
+    EXPECT_EQ(camera_->counts().missing_ids, 0u);
+}
+
+TEST_F(RingOfStaleFrames, a_flood_of_them_does_not_keep_a_read_from_its_time_out) {
+    std::atomic<bool> done{false};
+    std::thread program([&] {
+        while (!done) write(4000, done);
+    });
+    EXPECT_FALSE(camera_->read(5).has_value());
+    done = true;
+    program.join();
+    EXPECT_EQ(camera_->state().kind, CameraState::live);
 }
 
 TEST(RingCamera, a_program_that_does_nothing_is_given_up_at_the_start) {
