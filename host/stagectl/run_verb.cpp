@@ -24,6 +24,7 @@ struct Options {
     TakeInfo slate;
     int cycles = 0;
     std::string fill = "none", estimate = "none", quality;
+    std::vector<std::string> also;  // QUALITY=ARCHIVE
     double fps = 0;
     bool nominal = false, overwrite = false, single_float = false, json = false;
 };
@@ -38,6 +39,13 @@ Result<Calibration> open_calibration(const Options& options, const StageConfig& 
     return read_calibration(folder, stage);
 }
 
+// An archive that the take is to make.
+struct Planned {
+    std::string path;
+    TakeTargets targets;
+    ArchiveWriter archive;
+};
+
 TakeInfo take_info(const Options& options, const Sequence& sequence, const StageConfig& stage,
                    const TakeTargets& targets) {
     TakeInfo info = options.slate;
@@ -51,19 +59,8 @@ TakeInfo take_info(const Options& options, const Sequence& sequence, const Stage
     return info;
 }
 
-nlohmann::json to_json(const TakeReport& report, const Options& options) {
-    const RecordReport& record = report.record;
-    return {{"archive", options.output},
-            {"slots_total", record.slots_total},
-            {"slots_missing", record.slots_missing},
-            {"frames", record.frames},
-            {"frames_discarded", record.frames_discarded},
-            {"camera", camera_record(record.camera, record.camera_counts)},
-            {"duplicates", record.duplicates},
-            {"camera_restarts", record.camera_restarts},
-            {"clock_drift_ppm", record.clock_drift_ppm},
-            {"board_end", record.board_end},
-            {"camera_end", record.camera_end},
+nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
+    return {{"archive", archive},
             {"targets_written", report.targets_written},
             {"targets_missing", report.targets_missing},
             {"write_error", report.write_error},
@@ -72,8 +69,7 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
             {"unsolved_share", report.unsolved_share},
             {"misaligned_share", report.misaligned_share},
             {"seconds",
-             {{"total", report.seconds_total},
-              {"develop", report.seconds_develop},
+             {{"develop", report.seconds_develop},
               {"flow", report.seconds_motion.flow},
               {"planes", report.seconds_motion.planes},
               {"invert", report.seconds_motion.invert},
@@ -81,22 +77,28 @@ nlohmann::json to_json(const TakeReport& report, const Options& options) {
               {"write", report.seconds_write}}}};
 }
 
-void print_report(const TakeReport& report, bool is_estimate, const std::string& folder, const Options& options) {
+// The first archive's account with the recording's; those of --also in "also".
+nlohmann::json to_json(const TakeReport& report, const std::vector<Planned>& planned) {
     const RecordReport& record = report.record;
+    nlohmann::json json = to_json(report.outputs[0], planned[0].path);
+    json.update({{"slots_total", record.slots_total},
+                 {"slots_missing", record.slots_missing},
+                 {"frames", record.frames},
+                 {"frames_discarded", record.frames_discarded},
+                 {"camera", camera_record(record.camera, record.camera_counts)},
+                 {"duplicates", record.duplicates},
+                 {"camera_restarts", record.camera_restarts},
+                 {"clock_drift_ppm", record.clock_drift_ppm},
+                 {"board_end", record.board_end},
+                 {"camera_end", record.camera_end}});
+    json["seconds"]["total"] = report.seconds_total;
+    for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));
+    return json;
+}
+
+void print_output(const OutputReport& report, const std::string& folder, const Options& options) {
     if (!options.json)
-        fmt::print("{}: {} targets written, {} missing; {} of {} slots missing; {:.1f} s\n", options.output,
-                   report.targets_written, report.targets_missing, record.slots_missing, record.slots_total,
-                   report.seconds_total);
-    if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
-    if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
-    if (!record.unfit_frame.empty())
-        fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
-                   record.unfit_frame);
-    if (report.saturated_share > 0)
-        fmt::print(stderr,
-                   "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
-                   "for them: shorten the exposure\n",
-                   report.saturated_share * 100);
+        fmt::print("{}: {} targets written, {} missing\n", folder, report.targets_written, report.targets_missing);
     if (report.unsolved_share > 0)
         fmt::print(
             stderr,
@@ -110,13 +112,32 @@ void print_report(const TakeReport& report, bool is_estimate, const std::string&
                    "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",
                    report.misaligned_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
+    if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
+}
+
+void print_report(const TakeReport& report, bool is_estimate, const std::vector<Planned>& planned,
+                  const Options& options) {
+    const RecordReport& record = report.record;
+    for (size_t n = 0; n < planned.size(); ++n) print_output(report.outputs[n], planned[n].archive.folder(), options);
+    if (!options.json)
+        fmt::print("{} of {} slots missing; {:.1f} s\n", record.slots_missing, record.slots_total,
+                   report.seconds_total);
+    if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
+    if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
+    if (!record.unfit_frame.empty())
+        fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
+                   record.unfit_frame);
+    if (report.outputs[0].saturated_share > 0)
+        fmt::print(stderr,
+                   "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
+                   "for them: shorten the exposure\n",
+                   report.outputs[0].saturated_share * 100);
     if (is_estimate)
         fmt::print(stderr,
                    "stagectl: the basis has fewer independent rows than lamps: what was written is an estimate\n");
     if (record.slots_missing > 0)
         fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
-                   folder);
-    if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
+                   planned[0].archive.folder());
 }
 
 // The account of identified frames, a JSON line each.
@@ -188,6 +209,30 @@ void warn_of_long_cycles(const Sequence& sequence, const TakeTargets& targets) {
                    2e3 * reach_s, 1e3 * reach_s);
 }
 
+// The archive of -o, and those of --also, all made beside.
+Result<std::vector<Planned>> plan_outputs(const Options& options, const Sequence& sequence, const StageConfig& stage,
+                                          const TakeTargets& targets) {
+    std::vector<Planned> planned;
+    const auto add = [&](const std::string& path, const TakeTargets& chosen) -> Status {
+        auto archive =
+            ArchiveWriter::create_beside(path, take_info(options, sequence, stage, chosen), options.overwrite);
+        if (!archive.ok()) return archive.error();
+        planned.push_back({path, chosen, std::move(*archive)});
+        return Done{};
+    };
+    if (const Status added = add(options.output, targets); !added.ok()) return added.error();
+    for (const std::string& also : options.also) {
+        const size_t equals = also.find('=');
+        if (targets.every == 0 || equals == std::string::npos || equals + 1 == also.size())
+            return fail("--also " + also + ": give --fps, and QUALITY=ARCHIVE, as none=uncompensated.rfa");
+        auto quality = motion_quality(also.substr(0, equals));
+        if (!quality.ok()) return quality.error();
+        if (const Status added = add(also.substr(equals + 1), {targets.every, std::move(*quality)}); !added.ok())
+            return added.error();
+    }
+    return planned;
+}
+
 Result<int> run(const Options& options) {
     auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
@@ -210,24 +255,28 @@ Result<int> run(const Options& options) {
     warn_of_flicker(*sequence);
     auto account = open_account(options);
     if (!account.ok()) return account.error();
-    auto archive = ArchiveWriter::create_beside(options.output, take_info(options, *sequence, *stage, *targets),
-                                                options.overwrite);
-    if (!archive.ok()) return archive.error();
+    auto planned = plan_outputs(options, *sequence, *stage, *targets);
+    if (!planned.ok()) return planned.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
 
-    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options), *targets};
-    const auto report = run_take(take, {*session->board, {session->camera.get()}},
-                                 {*archive, [&](const Frame& frame) { add_to_account(*account, frame); },
-                                  [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }},
-                                 stop_on_signal());
+    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options)};
+    TakeSinks sinks{{},
+                    [&](const Frame& frame) { add_to_account(*account, frame); },
+                    [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }};
+    for (Planned& one : *planned) sinks.outputs.push_back({one.archive, one.targets});
+    const auto report = run_take(take, {*session->board, {session->camera.get()}}, sinks, stop_on_signal());
     if (!report.ok()) return report.error();
-    print_report(*report, sequence->basis.is_estimate, archive->folder(), options);
-    if (options.json) print_json(to_json(*report, options));
+    print_report(*report, sequence->basis.is_estimate, *planned, options);
+    if (options.json) print_json(to_json(*report, *planned));
     // The take is finished first, whatever became of its account.
     if (const Status told = account->finish(); !told.ok()) return told.error();
-    if (!report->write_error.empty()) return 1;
-    return report->targets_missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
+    int missing = 0;
+    for (const OutputReport& output : report->outputs) {
+        if (!output.write_error.empty()) return 1;
+        missing += output.targets_missing;
+    }
+    return missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
 }
 
 }  // namespace
@@ -263,6 +312,9 @@ void add_run_verb(CLI::App& app, int& exit_code) {
             "motion compensation of a performance: none, preview, standard (if not said otherwise) or final; what "
             "each costs and errs: docs/accuracy.md")
         ->check(CLI::IsMember(motion_quality_names()));
+    verb->add_option("--also", options->also,
+                     "the same performance in another quality, too, in an archive of its own: QUALITY=ARCHIVE; may be "
+                     "given several times, and shows what accuracy costs");
     verb->add_option("--frames", options->frames, "file for a JSON line a frame: its id and time, its cycle and slot");
     verb->add_option("--fill", options->fill,
                      "lost slots of the basis: none, or neighbours: the same slot of the cycles before and after; a "

@@ -29,16 +29,17 @@ int64_t count(MaskBit bit, const Target& target, double& worst) {
 
 }  // namespace
 
-CameraDeveloper::CameraDeveloper(const TakeDescription& take, uint32_t camera, TargetWriter& writer)
+CameraDeveloper::CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera,
+                                 TargetWriter& writer)
     : take_(take),
       camera_(camera),
-      is_performance_(take.targets.every > 0),
+      is_performance_(targets.every > 0),
       writer_(writer),
       developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
                  {take.masks.estimate, take.stage.lamps}),
       motion_developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
-                        {take.masks.estimate, take.stage.lamps}, take.targets.quality, std::max(take.targets.every, 1)),
-      plan_(plan_targets(take.sequence, take.masks, take.targets)),
+                        {take.masks.estimate, take.stage.lamps}, targets.quality, std::max(targets.every, 1)),
+      plan_(plan_targets(take.sequence, take.masks, targets)),
       store_(take.sequence),
       missing_(take.sequence),
       thread_([this] { develop(); }) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Camera developer: gathers the identified frames of one camera of a take and develops its targets, in a thread of its own.
+// Camera developer: gathers the identified frames of one camera and develops the targets of one output, in a thread of its own.
 #pragma once
 
 #include <optional>
@@ -18,14 +18,14 @@ namespace ols {
 class CameraDeveloper {
   public:
     struct Report {
-        // Shares of a target's pixels, in the worst target (TakeReport).
+        // Shares of a target's pixels, in the worst target (OutputReport).
         double saturated_share = 0, estimated_share = 0, unsolved_share = 0, misaligned_share = 0;
         double seconds = 0;
         MotionDeveloper::Times seconds_motion;
     };
 
     // `camera`: its place among the stage's. References must outlive the developer.
-    CameraDeveloper(const TakeDescription& take, uint32_t camera, TargetWriter& writer);
+    CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera, TargetWriter& writer);
     ~CameraDeveloper() { (void)finish(); }
 
     size_t target_count() const { return plan_.size(); }

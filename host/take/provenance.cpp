@@ -90,8 +90,8 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
     return json;
 }
 
-nlohmann::json describe_take(const TakeDescription& take, const Board& board, const RecordReport& record,
-                             const nlohmann::json& missing) {
+nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
+                             const RecordReport& record, const nlohmann::json& missing) {
     nlohmann::json json = {{"sequence", describe_sequence(take.sequence)},
                            {"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}},
                            {"calibration", take.calibration.source},
@@ -107,7 +107,7 @@ nlohmann::json describe_take(const TakeDescription& take, const Board& board, co
                              {"board_end", record.board_end},
                              {"camera_end", record.camera_end},
                              {"camera", camera_record(record.camera, record.camera_counts)}}}};
-    if (take.targets.every > 0) json["motion"] = describe_motion(take.sequence, take.targets);
+    if (targets.every > 0) json["motion"] = describe_motion(take.sequence, targets);
     return json;
 }
 

@@ -15,7 +15,7 @@ nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence
 nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequence);
 
 // Of the take, for the manifest's `extra`. `missing`: one account (missing_ranges.hpp) a camera.
-nlohmann::json describe_take(const TakeDescription& take, const Board& board, const RecordReport& record,
-                             const nlohmann::json& missing);
+nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
+                             const RecordReport& record, const nlohmann::json& missing);
 
 }  // namespace ols

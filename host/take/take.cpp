@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <memory>
 #include <numeric>
 
 #include "take/camera_developer.hpp"
@@ -15,28 +17,50 @@ namespace ols {
 
 namespace {
 
-// Cycles whose frames developing holds besides the one being developed and the one being gathered (RecordSink).
-size_t cycles_kept(const TakeDescription& take) {
-    if (take.targets.every > 0) return 3;
-    return take.masks.fill_from_neighbours ? 2 : 0;
+// Cycles whose frames developing holds besides the one being developed and the one being gathered (RecordSink): those of the
+// output that needs most, since all hold the same frames.
+size_t cycles_kept(const TakeMasks& masks, const std::vector<TakeOutput>& outputs) {
+    const bool has_performance =
+        std::ranges::any_of(outputs, [](const TakeOutput& output) { return output.targets.every > 0; });
+    if (has_performance) return 3;
+    return masks.fill_from_neighbours ? 2 : 0;
 }
 
-TakeReport merged(const RecordReport& record, const CameraDeveloper::Report& developed,
-                  const TargetWriter::Report& written) {
-    TakeReport report;
-    report.record = record;
-    report.targets_written = written.written;
-    report.targets_missing = written.missing;
-    report.write_error = written.error;
-    report.seconds_write = written.seconds;
-    report.saturated_share = developed.saturated_share;
-    report.estimated_share = developed.estimated_share;
-    report.unsolved_share = developed.unsolved_share;
-    report.misaligned_share = developed.misaligned_share;
-    report.seconds_develop = developed.seconds;
-    report.seconds_motion = developed.seconds_motion;
-    return report;
-}
+// An archive that is being made of the recording.
+class Output {
+  public:
+    Output(const TakeDescription& take, const TakeOutput& output)
+        : archive_(output.archive),
+          targets_(output.targets),
+          writer_(output.archive),
+          developer_(take, targets_, 0, writer_) {}
+
+    Status begin() { return archive_.expect_targets(0, uint32_t(developer_.target_count())); }
+    void take_place() { writer_.take_place(); }
+    CameraDeveloper& developer() { return developer_; }
+
+    // Waits until everything is developed and written.
+    OutputReport wait() {
+        const CameraDeveloper::Report developed = developer_.finish();
+        const TargetWriter::Report written = writer_.finish();
+        return {written.written,           written.missing,
+                developed.saturated_share, developed.estimated_share,
+                developed.unsolved_share,  developed.misaligned_share,
+                developed.seconds,         written.seconds,
+                developed.seconds_motion,  written.error};
+    }
+
+    Status finish(const TakeDescription& take, const Board& board, const RecordReport& record) {
+        archive_.add_to_manifest(describe_take(take, targets_, board, record, developer_.missing_json()));
+        return archive_.finish();
+    }
+
+  private:
+    ArchiveWriter& archive_;
+    const TakeTargets targets_;
+    TargetWriter writer_;
+    CameraDeveloper developer_;
+};
 
 // Why a take has not one frame; nothing is kept of it.
 Error nothing_came(const RecordReport& record) {
@@ -67,31 +91,37 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
             fmt::format("a take is recorded from one camera, and there are {}: keep one [[camera]] in the stage",
                         take.stage.cameras.size()));
     const auto start = std::chrono::steady_clock::now();
-    TargetWriter writer(sinks.archive);
-    CameraDeveloper developer(take, 0, writer);
-    if (const auto told = sinks.archive.expect_targets(0, uint32_t(developer.target_count())); !told)
-        return told.error();
+    std::vector<std::unique_ptr<Output>> outputs;
+    for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output));
+    for (const auto& output : outputs)
+        if (const auto begun = output->begin(); !begun) return begun.error();
     bool has_frame = false;
-    const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
-                              if (!std::exchange(has_frame, true)) writer.take_place();
+    const RecordSink sink{[&](const std::shared_ptr<const Frame>& frame) {
+                              if (!std::exchange(has_frame, true))
+                                  for (const auto& output : outputs) output->take_place();
                               sinks.identified(*frame);
-                              developer.add_frame(std::move(frame));
+                              for (const auto& output : outputs) output->developer().add_frame(frame);
                           },
-                          [&](const MissingSlot& slot) { developer.add_missing(slot); },
+                          [&](const MissingSlot& slot) {
+                              for (const auto& output : outputs) output->developer().add_missing(slot);
+                          },
                           [&](uint64_t decided, uint64_t total) {
-                              developer.hand_on(decided);
+                              for (const auto& output : outputs) output->developer().hand_on(decided);
                               sinks.progress(decided, total);
                           },
-                          cycles_kept(take)};
+                          cycles_kept(take.masks, sinks.outputs)};
+    TakeReport report;
     const auto record = record_take(devices.board, *devices.cameras[0], take.sequence, take.stage,
                                     measured_black(take.calibration), sink, stop);
-    const auto developed = developer.finish();
-    TakeReport report = merged(record.ok() ? *record : RecordReport{}, developed, writer.finish());
+    for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);
-    sinks.archive.add_to_manifest(describe_take(take, devices.board, *record, developer.missing_json()));
-    const Status finished = sinks.archive.finish();
-    if (!finished.ok() && report.write_error.empty()) report.write_error = finished.error().message;
+    report.record = *record;
+    for (size_t n = 0; n < outputs.size(); ++n) {
+        const Status finished = outputs[n]->finish(take, devices.board, *record);
+        if (!finished.ok() && report.outputs[n].write_error.empty())
+            report.outputs[n].write_error = finished.error().message;
+    }
     report.seconds_total = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return report;
 }

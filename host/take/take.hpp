@@ -30,13 +30,12 @@ struct TakeTargets {
     MotionQuality quality = {};  // of a performance
 };
 
-// What is to be recorded, and what of it is to be made.
+// What is to be recorded.
 struct TakeDescription {
     Sequence sequence;
     StageConfig stage;
     Calibration calibration;  // of the stage's cameras, in their order
     TakeMasks masks;
-    TakeTargets targets;
 };
 
 // What it is recorded with.
@@ -45,31 +44,41 @@ struct TakeDevices {
     std::vector<Camera*> cameras;  // the stage's, in their order
 };
 
-// Where it goes.
-struct TakeSinks {
+// One archive that is made of the recording.
+struct TakeOutput {
     // Its info gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
     // It takes its place with the first frame that has its slot, so that a start that fails touches no earlier archive.
     ArchiveWriter& archive;
+    TakeTargets targets;
+};
+
+// Where it goes.
+struct TakeSinks {
+    std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
     std::function<void(const Frame&)> identified;                    // every frame that has its slot
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
 };
 
-struct TakeReport {
-    RecordReport record;
+// Of one archive.
+struct OutputReport {
     int targets_written = 0, targets_missing = 0;
-    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, and not solved.
-    double saturated_share = 0, estimated_share = 0, unsolved_share = 0;
-    // Where the time went: of the whole take, and busy in each thread.
-    double seconds_total = 0, seconds_develop = 0, seconds_write = 0;
-    MotionDeveloper::Times seconds_motion;  // parts of seconds_develop, of a performance
-    // Share of a target's pixels where motion compensation failed, in the worst target.
-    double misaligned_share = 0;
-    std::string write_error;  // what could not be written first, and why; empty when all was
+    // Shares of a target's pixels, in the worst target: with a saturated sample, estimated, not solved, and where motion
+    // compensation failed.
+    double saturated_share = 0, estimated_share = 0, unsolved_share = 0, misaligned_share = 0;
+    double seconds_develop = 0, seconds_write = 0;  // busy in each thread
+    MotionDeveloper::Times seconds_motion;          // parts of seconds_develop, of a performance
+    std::string write_error;                        // what could not be written first, and why; empty when all was
 };
 
-// Threads: the camera's, the board's, the caller's, which identifies and calls the sinks, one that develops, one that writes.
-// Each hands on one thing at a time, and developing runs on all processors; memory is bounded by frames_in_flight() frames and
-// two targets. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
+struct TakeReport {
+    RecordReport record;
+    std::vector<OutputReport> outputs;  // in their order
+    double seconds_total = 0;
+};
+
+// Threads: the camera's, the board's, the caller's, which identifies and calls the sinks, and for each output one that develops
+// and one that writes. Each hands on one thing at a time, and developing runs on all processors; memory is bounded by
+// frames_in_flight() frames and two targets an output. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
 // Every target that was to come is in the archive's journal at the end, finished or missing with its reason.
 // Errors: as many cameras as the recorder takes (one) were not given; the board cannot be started; not one frame came. Then there
 // is no archive. Anything later is in the report and in the archive.

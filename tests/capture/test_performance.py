@@ -78,6 +78,16 @@ def test_targets_stand_at_every_fifth_tracking_frame_that_a_whole_basis_lies_aro
         assert verify(still[name]).returncode == 0
 
 
+def test_one_recording_developed_in_several_qualities_gives_the_bits_of_a_take_each(still, tmp_path):
+    others = {name: tmp_path / f"{name}.rfa" for name in ("none", "preview")}
+    also = [word for name, path in others.items() for word in ("--also", f"{name}={path}")]
+    takes = {**others, "standard": record(tmp_path / "several", "spheres.toml", "--fps", 24, "--quality", "standard", *also)}
+    for name, archive in takes.items():
+        assert manifest(archive) == manifest(still[name]), name
+        for index in range(len(targets(still[name]))):
+            assert target_file(archive, index).read_bytes() == target_file(still[name], index).read_bytes()
+
+
 def test_the_operator_is_warned_of_flicker_and_told_the_exact_rate_that_the_archive_has(still):
     said = (still["preview"].parent / "said.txt").read_text()
     assert "can trigger seizures" in said

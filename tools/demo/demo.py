@@ -121,13 +121,12 @@ class Demo:
 
     def move(self):
         """A moving head, with motion compensation and without."""
-        takes = moving.record(self.clock, self.out)
+        take = moving.record(self.clock, self.out)
         films = moving.film(self.clock, self.out, environment(moving.ENVIRONMENT))
         moving.animate(films, self.out / "moving.gif")
         moving.sequence(films, self.out / "moving.jpg")
         figures = moving.compare(self.out)
-        for quality, take in takes.items():
-            figures[f"moving_slots_missing_{quality}"] = take["slots_missing"]
+        figures["moving_slots_missing"] = take["slots_missing"]
         return figures
 
     def compare(self):
