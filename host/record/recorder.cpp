@@ -270,8 +270,8 @@ Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& s
     Recording recording(sequence, sink, *started.time_ns);
     const auto why_stop = [&]() -> std::string {
         if (stop) return "the take was stopped";
-        const bool can_go_on = camera.state().kind == CameraState::live;
-        return can_go_on ? "" : "the take was stopped, as its camera gives no more frames";
+        const CameraState state = camera.state();
+        return state.kind == CameraState::live ? "" : "the take was stopped: " + state.why;
     };
     {
         CameraReader reader(camera, config, black_counts, in_flight, queue);
