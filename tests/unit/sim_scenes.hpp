@@ -2,7 +2,7 @@
 // Small scenes and stages that the tests of the virtual stage share.
 #pragma once
 
-#include "scene.hpp"
+#include "scene/scene.hpp"
 #include "stage/stage.hpp"
 
 namespace ols {

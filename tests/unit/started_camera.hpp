@@ -6,7 +6,7 @@
 
 #include <thread>
 
-#include "virtual_camera.hpp"
+#include "run/virtual_camera.hpp"
 
 namespace ols {
 

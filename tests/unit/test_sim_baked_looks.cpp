@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "baked_looks.hpp"
-#include "pinhole.hpp"
+#include "render/baked_looks.hpp"
+#include "render/pinhole.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;

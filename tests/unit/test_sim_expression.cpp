@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "geometry.hpp"
-#include "scene.hpp"
+#include "scene/geometry.hpp"
+#include "scene/scene.hpp"
 
 using namespace ols;
 

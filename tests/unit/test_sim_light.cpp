@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "effects/specular.hpp"
-#include "renderer.hpp"
+#include "render/effects/specular.hpp"
+#include "render/renderer.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;

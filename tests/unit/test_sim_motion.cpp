@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "renderer.hpp"
+#include "render/renderer.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;

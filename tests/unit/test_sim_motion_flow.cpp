@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <numbers>
 
-#include "renderer.hpp"
+#include "render/renderer.hpp"
+#include "render/true_flow.hpp"
 #include "sim_scenes.hpp"
-#include "true_flow.hpp"
 
 using namespace ols;
 

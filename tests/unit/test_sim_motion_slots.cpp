@@ -8,8 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "run/slot_frames.hpp"
 #include "sim_scenes.hpp"
-#include "slot_frames.hpp"
 #include "started_camera.hpp"
 
 using namespace ols;

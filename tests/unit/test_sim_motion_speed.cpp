@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "renderer.hpp"
+#include "render/renderer.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;

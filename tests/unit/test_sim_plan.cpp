@@ -3,7 +3,7 @@
 // links: ols_stagesim
 #include <gtest/gtest.h>
 
-#include "plan.hpp"
+#include "run/plan.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "scene.hpp"
+#include "scene/scene.hpp"
 
 using namespace ols;
 

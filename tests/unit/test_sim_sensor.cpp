@@ -5,11 +5,11 @@
 
 #include <cmath>
 
-#include "effects/quantisation.hpp"
-#include "effects/sensor_noise.hpp"
-#include "effects/vignetting.hpp"
-#include "philox.hpp"
-#include "renderer.hpp"
+#include "render/effects/quantisation.hpp"
+#include "render/effects/sensor_noise.hpp"
+#include "render/effects/vignetting.hpp"
+#include "render/philox.hpp"
+#include "render/renderer.hpp"
 #include "sim_scenes.hpp"
 
 using namespace ols;
