@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A float source that delivers NaN or Inf in one row: all 156 lamps of the pixel rest on it.
-// links: ols_develop
+// links: ols_develop ols_archive
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <memory>
 #include <random>
 
+#include "archive/archive.hpp"
 #include "develop/develop.hpp"
 #include "hard_case.hpp"
 
