@@ -30,7 +30,11 @@ int open_folder(const fs::path& folder) {
 
 // Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive.
 bool belongs_to_archive(std::string relative) {
-    if (relative.ends_with(unfinished_suffix)) relative.resize(relative.size() - std::strlen(unfinished_suffix));
+    // What is not finished ends with ".part", and where image/whole_file.hpp writes it with a number, too.
+    const size_t part = relative.rfind(unfinished_suffix);
+    if (part != std::string::npos &&
+        relative.find_first_not_of("0123456789-", part + std::strlen(unfinished_suffix)) == std::string::npos)
+        relative.resize(part);
     unsigned camera = 0, index = 0;
     const int numbers = std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index);
     if (numbers == 2) return relative == target_file_name(camera, index);

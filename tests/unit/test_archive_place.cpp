@@ -108,6 +108,9 @@ TEST_F(ArchivePlaces, a_writer_killed_before_its_first_frame_blocks_no_later_one
     { OtherWriter other(path, false); }
     EXPECT_EQ(entries_of(directory).size(), 2u);
     EXPECT_TRUE(old_take_is_whole());
+    // It may have died while it wrote any of its files.
+    for (const char* half_written : {"lights.lp.part4711-2", "manifest.json.part", "lights.lp.part12-0"})
+        std::ofstream(directory + "/.take.rfa.recording/" + half_written) << "half";
     auto next = ArchiveWriter::create(path, take_info(3), true);
     ASSERT_TRUE(next.ok()) << next.error().message;
     EXPECT_EQ(entries_of(directory), std::vector<std::string>{"take.rfa"});
