@@ -49,16 +49,21 @@ def test_a_board_that_refuses_leaves_the_old_take_whole_and_no_empty_new_one(tmp
     assert "2 targets intact" in verify(old).stdout and verify(old).returncode == 0
 
 
-def test_frames_of_which_none_fits_leave_the_old_take_and_say_what_came(tmp_path):
+def test_a_camera_that_is_not_the_stages_and_one_whose_frames_are_not_leave_the_old_take(tmp_path):
     takes = tmp_path / "takes"
     takes.mkdir()
     archive = takes / "take.rfa"
-    with VirtualStage(tmp_path / "work", "spheres.toml") as stage:
+    faults = tmp_path / "faults.toml"
+    # The second take's frames, all of them, are two rows short.
+    faults.write_text("".join(f'[[fault]]\nkind = "wrong_size"\ntrigger = {trigger}\n' for trigger in range(180, 360)))
+    with VirtualStage(tmp_path / "work", "spheres.toml", "--inject", faults) as stage:
         stage.stagectl(*run_arguments(archive))
         before = contents(archive)
-        stage.stage.write_text("[[camera]]\nwidth = 80\nheight = 60\n")
         printed = stage.stagectl(*run_arguments(archive, "--overwrite"), code=1)
-    assert "64 x 48 pixels" in printed and "nothing is kept" in printed
+        assert "64 x 46 pixels" in printed and "nothing is kept" in printed
+        stage.stage.write_text("[[camera]]\nwidth = 80\nheight = 48\n")
+        printed = stage.stagectl(*run_arguments(archive, "--overwrite"), code=1)
+        assert "width" in printed and "64" in printed and "80" in printed
     assert contents(archive) == before and entries(takes) == ["take.rfa"]
 
 
