@@ -219,7 +219,7 @@ def main():
         ("is every label, edge and archive right?", 1, lambda: report.update(demo.check()), None),
         ("the bases against the truth", 2, lambda: report.update(demo.compare()), "bases.png"),
         ("noise against its model", 1, lambda: report.update(noise=demo.predict_noise()), None),
-        ("the moving head, with and without compensation, every frame rendered", 6, lambda: report.update(demo.move()),
+        ("the moving head, with and without compensation, every frame rendered", 3, lambda: report.update(demo.move()),
          "moving.gif, moving.jpg; for motion blur moving/blurred_*.png"),
     ], options.out)
     chapters.play()
