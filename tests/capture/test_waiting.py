@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Nothing waits for ever, whoever stops, dies or does not come; and frames that were for nobody, or for somebody who has gone,
 are not taken for a later take's. Bounds are minutes: what must not happen is a wait without end."""
+import contextlib
 import json
 import os
 import random
@@ -134,13 +135,23 @@ class DeafLog:
         self.server = socket.socket(socket.AF_UNIX)
         self.server.bind(str(path))
         self.server.listen(1)
-        threading.Thread(target=self.serve, daemon=True).start()
+        self.begin(self.serve)
+
+    @staticmethod
+    def begin(carry, *ends):
+        """In a thread of its own, until either end hangs up."""
+
+        def work():
+            with contextlib.suppress(OSError):
+                carry(*ends)
+
+        threading.Thread(target=work, daemon=True).start()
 
     def serve(self):
         client, _ = self.server.accept()
         board = socket.socket(socket.AF_UNIX)
         board.connect(str(self.board))
-        threading.Thread(target=self.carry_back, args=(board, client), daemon=True).start()
+        self.begin(self.carry_back, board, client)
         while head := self.receive(client, self.REQUEST_BYTES):
             _, tag, _, endpoint, _, length, _, _ = struct.unpack("<IIBBHII8s", head)
             payload = b"" if endpoint & 0x80 else self.receive(client, length)
