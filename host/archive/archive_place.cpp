@@ -168,7 +168,12 @@ Status ArchivePlace::take() {
         // Not every file system can exchange: the old one goes aside first. A crash in between leaves both.
         const fs::path aside = root_.string() + ".replaced";
         if (rename(root_.c_str(), aside.c_str()) != 0) return disk_error("put aside", root_.string(), errno);
-        if (!rename_as(0)) return disk_error("rename a recording to", root_.string(), errno);
+        if (!rename_as(0)) {
+            const int error_number = errno;
+            [[maybe_unused]] const int back = rename(aside.c_str(), root_.c_str());
+            return disk_error("rename '" + beside.string() + "', where the recording stays, to", root_.string(),
+                              error_number);
+        }
         folder_ = root_, was_placed_ = true;
         if (auto synced = sync_directory(root_.parent_path().string()); !synced) return synced;
         return remove_folder(aside);
