@@ -25,7 +25,7 @@ static struct play {
     enum ols_start_source started_by;
     uint32_t stamps_read;
     uint32_t cycles_of_done;   // of the program that has played to its end
-    uint8_t programs_swapped;  // into it
+    uint8_t programs_swapped;  // in
 } play;                        // since arm
 static bool leaving;           // for the boot loader
 
@@ -49,6 +49,8 @@ static void forget_programs(void) {
 void stage_init(void) {
     leaving = false;
     stop_unguard();
+    heartbeat_end();
+    edges_arm(OLS_START_BY_COMMAND, 0);
     forget_programs();
     trigger_log_begin(programs_current(), false);
     if (fault_latched().cause != OLS_FAULT_NONE) state = OLS_STATE_FAULT;

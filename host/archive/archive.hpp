@@ -89,8 +89,9 @@ class ArchiveWriter {
     // The same for a target larger than memory: `head.lamps` is empty and blocks of planes come from `source`.
     Status write_target(const Target& head, const PlaneSource& source);
 
-    // Journals a target that could not be made, and why; room for it is set aside even on a full disk, for a shortened
-    // reason and without `detail`. What cannot be journaled now is at the next chance, finish() at the latest.
+    // Journals a target that could not be made, and why. On a full disk the line comes later, when a target succeeds again or
+    // another reason begins, at finish() at the latest, into room that is set aside: neighbours that are missing for one
+    // reason in one line, with a shortened reason and without `detail`.
     Status note_missing_target(uint32_t camera, uint32_t index, const std::string& why,
                                const nlohmann::json& detail = {});
 
@@ -142,7 +143,8 @@ class ArchiveReader {
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
     // Runs of targets that were to come and are neither: the recording was interrupted. Empty if how many is not known.
     std::vector<TargetEntry> undecided() const;
-    bool finished() const;  // the journal has its end
+    bool finished() const;       // the journal has its end
+    bool being_written() const;  // by a process that lives; false once finished
 
     // Everything of a target but its samples: size, colour filter, missing lamps, provenance, times of its motion.
     Result<Target> read_head(uint32_t camera, uint32_t index) const;

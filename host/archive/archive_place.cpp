@@ -5,11 +5,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "archive/disk.hpp"
@@ -57,6 +59,20 @@ bool holds_targets(const fs::path& folder) {
     for (const auto& entry : fs::recursive_directory_iterator(folder, error))
         if (entry.path().extension() == ".exr") return true;
     return false;
+}
+
+// Device and inode; what is not there is like nothing else.
+std::optional<std::pair<dev_t, ino_t>> identity_of(int result, const struct stat& info) {
+    if (result != 0) return std::nullopt;
+    return std::pair(info.st_dev, info.st_ino);
+}
+auto folder_identity(int fd) {
+    struct stat info {};
+    return identity_of(fstat(fd, &info), info);
+}
+auto folder_identity(const fs::path& folder) {
+    struct stat info {};
+    return identity_of(lstat(folder.c_str(), &info), info);
 }
 
 Status remove_folder(const fs::path& folder) {
@@ -145,9 +161,10 @@ Status ArchivePlace::make_folder() {
     auto lock = FolderLock::take(folder_);
     if (!lock) return lock.error();
     if (is_left) {
-        if (holds_targets(folder_) && !replaces_)
-            return fail("'" + folder_.string() + "' holds targets that an interrupted swap left: name it '" +
-                        root_.string() + "' to keep them, or remove it");
+        if (holds_targets(folder_))
+            return fail("'" + folder_.string() +
+                        "' holds targets that an interrupted swap or a take that found its name taken left: rename it "
+                        "to keep them, or remove it");
         if (const auto checked = check_for_strangers(folder_); !checked) return checked;
         for (const auto& entry : fs::directory_iterator(folder_, error)) fs::remove_all(entry.path(), error);
         if (error) return fail("cannot empty '" + folder_.string() + "': " + error.message());
@@ -157,6 +174,16 @@ Status ArchivePlace::make_folder() {
     return Done{};
 }
 
+// Removes what was replaced, if it still is what was looked at in the beginning.
+Status ArchivePlace::remove_replaced(const fs::path& folder) {
+    const auto looked_at = folder_identity(replaced_lock_.fd()), there = folder_identity(folder);
+    if (looked_at != there)
+        return fail("'" + folder.string() + "' is another folder than '" + root_.string() +
+                    "' was when the recording began: it is kept; look into it");
+    if (const auto checked = check_for_strangers(folder); !checked) return checked;
+    return remove_folder(folder);
+}
+
 Status ArchivePlace::take() {
     if (was_placed_) return Done{};
     is_ours_ = false;
@@ -164,28 +191,31 @@ Status ArchivePlace::take() {
         return renameat2(AT_FDCWD, folder_.c_str(), AT_FDCWD, root_.c_str(), flags) == 0;
     };
     const fs::path beside = folder_;
+    const auto can_not = [] { return errno == EINVAL || errno == ENOSYS; };
+    const auto kept_beside = [&](int error_number) {
+        return disk_error("rename '" + beside.string() + "', where the recording stays, to", root_.string(),
+                          error_number);
+    };
     if (replaces_ && !rename_as(RENAME_EXCHANGE)) {
+        if (!can_not()) return kept_beside(errno);
         // Not every file system can exchange: the old one goes aside first. A crash in between leaves both.
         const fs::path aside = root_.string() + ".replaced";
-        if (rename(root_.c_str(), aside.c_str()) != 0) return disk_error("put aside", root_.string(), errno);
+        if (rename(root_.c_str(), aside.c_str()) != 0)
+            return disk_error("put '" + root_.string() + "' aside as", aside.string(), errno);
         if (!rename_as(0)) {
             const int error_number = errno;
             [[maybe_unused]] const int back = rename(aside.c_str(), root_.c_str());
-            return disk_error("rename '" + beside.string() + "', where the recording stays, to", root_.string(),
-                              error_number);
+            return kept_beside(error_number);
         }
         folder_ = root_, was_placed_ = true;
         if (auto synced = sync_directory(root_.parent_path().string()); !synced) return synced;
-        return remove_folder(aside);
+        return remove_replaced(aside);
     }
-    if (!replaces_ && !rename_as(RENAME_NOREPLACE)) {
-        const bool can_not = errno == EINVAL || errno == ENOSYS;
-        if (!can_not || !rename_as(0))  // a plain rename replaces nothing but an empty folder
-            return disk_error("rename '" + beside.string() + "', where the recording stays, to", root_.string(), errno);
-    }
+    // A plain rename replaces nothing but an empty folder.
+    if (!replaces_ && !rename_as(RENAME_NOREPLACE) && !(can_not() && rename_as(0))) return kept_beside(errno);
     folder_ = root_, was_placed_ = true;
     if (auto synced = sync_directory(root_.parent_path().string()); !synced) return synced;
-    return replaces_ ? remove_folder(beside) : Status(Done{});
+    return replaces_ ? remove_replaced(beside) : Status(Done{});
 }
 
 }  // namespace ols

@@ -21,6 +21,8 @@ class FolderLock {
     // Error: the folder cannot be opened, or another process holds it.
     static Result<FolderLock> take(const std::filesystem::path& folder);
 
+    int fd() const { return fd_; }
+
   private:
     int fd_ = -1;
 };
@@ -39,8 +41,8 @@ class ArchivePlace {
     // Where the files are.
     const std::filesystem::path& folder() const { return folder_; }
 
-    // Gives the folder its name, in one step where the file system can, and removes the archive it replaces. After an
-    // error the folder stays where it is, for good. Does nothing the second time.
+    // Gives the folder its name, in one step where the file system can, and removes the archive it replaces, unless that is
+    // not any more what it was. After an error the folder stays where it is, for good. Does nothing once that was done.
     Status take();
 
     ArchivePlace(ArchivePlace&& other) noexcept;
@@ -50,6 +52,7 @@ class ArchivePlace {
     ArchivePlace() = default;
     Status hold_what_is_replaced();
     Status make_folder();
+    Status remove_replaced(const std::filesystem::path& folder);
 
     std::filesystem::path root_, folder_;
     FolderLock lock_, replaced_lock_;

@@ -122,6 +122,9 @@ std::vector<TargetEntry> ArchiveReader::undecided() const {
 bool ArchiveReader::finished() const {
     return state_->journal.ended;
 }
+bool ArchiveReader::being_written() const {
+    return !finished() && is_being_written(state_->root);
+}
 
 Result<Target> ArchiveReader::read_head(uint32_t camera, uint32_t index) const {
     const auto file = finished_file(state_->root, state_->journal, camera, index);
@@ -173,7 +176,7 @@ Verification ArchiveReader::verify() const {
     check(manifest_name, journal.manifest);
     result.problems.insert(result.problems.end(), journal.problems.begin(), journal.problems.end());
     find_leftovers(root, journal, result.problems);
-    const bool goes_on = !journal.ended && is_being_written(root);
+    const bool goes_on = being_written();
     for (const auto& run : undecided_targets(journal))
         result.problems.push_back(
             fmt::format("camera {}: {} {}", run.camera, target_words(run), goes_on ? "to come" : "never finished"));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <deque>
 #include <filesystem>
 #include <set>
 
@@ -52,13 +53,44 @@ struct ArchiveWriter::State {
     JournalWriter journal;
     ReservedFile manifest;
     std::set<std::pair<uint32_t, uint32_t>> written = {};  // camera and index
-    std::vector<MissingRun> missing = {}, not_journaled = {};
+    std::vector<MissingRun> missing = {};                  // that the journal has
+    std::deque<MissingRun> pending = {};  // that it has not, on a full disk; what follows the last may join it
     bool finished = false;
 
     bool has(uint32_t camera, uint32_t index) const {
-        return written.contains({camera, index}) || std::ranges::any_of(missing, [&](const MissingRun& run) {
-                   return run.camera == camera && run.first <= index && index <= run.last;
-               });
+        const auto holds = [&](const MissingRun& run) {
+            return run.camera == camera && run.first <= index && index <= run.last;
+        };
+        return written.contains({camera, index}) || std::ranges::any_of(missing, holds) ||
+               std::ranges::any_of(pending, holds);
+    }
+
+    Status note(MissingRun run) {
+        if (journal.append(journal_line(run))) {
+            missing.push_back(std::move(run));
+            return Done{};
+        }
+        // The room set aside is for short lines, and for one a run, however many targets a full disk takes.
+        run.detail = nullptr;
+        run.why.resize(std::min(run.why.size(), short_reason_bytes));
+        if (!pending.empty()) {
+            MissingRun& before = pending.back();
+            if (before.camera == run.camera && before.last + 1 == run.first && before.why == run.why) {
+                before.last = run.last;
+                return Done{};
+            }
+        }
+        const Status journaled = journal_pending();
+        pending.push_back(std::move(run));
+        return journaled;
+    }
+
+    Status journal_pending() {
+        for (; !pending.empty(); pending.pop_front()) {
+            if (auto s = journal.append_reserved(journal_line(pending.front())); !s) return s;
+            missing.push_back(std::move(pending.front()));
+        }
+        return Done{};
     }
 };
 
@@ -71,6 +103,13 @@ Status check_info(const TakeInfo& info) {
         if (const auto frames = timecode_frames(info.timecode_start, info.frame_rate_hz); !frames)
             return frames.error();
     return Done{};
+}
+
+// A reason that names the target's own file says so in words: what one disk did to many targets is one reason.
+std::string without_name(std::string why, const fs::path& file) {
+    for (const std::string& name : {"'" + file.string() + unfinished_suffix + "'", "'" + file.string() + "'"})
+        if (const size_t at = why.find(name); at != std::string::npos) why.replace(at, name.size(), "its file");
+    return why;
 }
 
 // lights.lp names lamps by their layers: what stands in the file is what stands in the images.
@@ -186,6 +225,7 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
         return s;
     }
     state.written.insert({head.camera, head.index});
+    (void)state.journal_pending();  // what still has no room stays pending
     return Done{};
 }
 
@@ -193,24 +233,15 @@ Status ArchiveWriter::note_missing_target(uint32_t camera, uint32_t index, const
                                           const nlohmann::json& detail) {
     State& state = *state_;
     assert(!state.finished && !why.empty());
-    if (state.has(camera, index)) return fail("target '" + target_file_name(camera, index) + "' is already noted");
-    const MissingRun run{camera, index, index, why, detail};
-    state.missing.push_back(run);
-    if (state.journal.append(journal_line(run))) return Done{};
-    const MissingRun shortened{camera, index, index, why.substr(0, short_reason_bytes), {}};
-    const Status noted = state.journal.append_reserved(journal_line(shortened));
-    if (!noted) state.not_journaled.push_back(shortened);
-    return noted;
+    const std::string file = target_file_name(camera, index);
+    if (state.has(camera, index)) return fail("target '" + file + "' is already noted");
+    return state.note({camera, index, index, without_name(why, state.place.folder() / file), detail});
 }
 
 Status ArchiveWriter::note_missing_targets(uint32_t camera, uint32_t first, uint32_t last, const std::string& why) {
     State& state = *state_;
     assert(!state.finished && !why.empty() && first <= last);
-    const MissingRun run{camera, first, last, why.substr(0, short_reason_bytes), {}};
-    state.missing.push_back(run);
-    const Status noted = state.journal.append_reserved(journal_line(run));
-    if (!noted) state.not_journaled.push_back(run);
-    return noted;
+    return state.note({camera, first, last, why, nullptr});
 }
 
 void ArchiveWriter::add_to_manifest(const nlohmann::json& extra) {
@@ -220,9 +251,7 @@ void ArchiveWriter::add_to_manifest(const nlohmann::json& extra) {
 Status ArchiveWriter::finish() {
     State& state = *state_;
     assert(!state.finished);
-    for (const MissingRun& run : state.not_journaled)
-        if (auto s = state.journal.append_reserved(journal_line(run)); !s) return s;
-    state.not_journaled.clear();
+    if (auto s = state.journal_pending(); !s) return s;
     nlohmann::json manifest = manifest_of(state.info), missing = nlohmann::json::array();
     uint64_t missing_count = 0;
     for (const MissingRun& run : state.missing) {

@@ -6,12 +6,12 @@
 #include <cassert>
 #include <cmath>
 
+#include "stage/row_losses.hpp"
+
 namespace ols {
 
 namespace {
 
-// A pivot below this, of a projector whose largest entry is about d / rows: the set is not solvable.
-constexpr double pivot_least = 1e-9;
 // How much more the residual counts than the prior in their joint form. What the rows say of a masked one is thus weighed
 // against the prior with an error of 1e-7, and double precision still has nine digits for the solution.
 constexpr double residual_weight = 1e7;

@@ -50,7 +50,8 @@ Status check_setup(const std::string& camera, const CameraSetup& wanted, const C
     compare("trigger_activation", wanted.trigger_activation, accepted.trigger_activation);
     compare("trigger_delay_us", wanted.trigger_delay_us, accepted.trigger_delay_us);
     compare("exposure_mode", wanted.exposure_mode, accepted.exposure_mode);
-    if (wanted.exposure_mode == ExposureMode::timed) compare("exposure_us", wanted.exposure_us, accepted.exposure_us);
+    if (wanted.exposure_mode == ExposureMode::timed && accepted.exposure_mode == ExposureMode::timed)
+        compare("exposure_us", wanted.exposure_us, accepted.exposure_us);
     if (problems.empty()) return Done{};
     return fail(camera + " is not as the stage's [[camera]] says: " + problems);
 }

@@ -15,7 +15,8 @@ namespace {
 
 constexpr uint64_t clock_begin_ns = 7'000'000'000;  // the camera's clock counts from its power-up, not from ours
 constexpr uint64_t call_period_ns = 1'000'000;      // of exposures by trigger()
-constexpr double rate_max_hz = 100'000;
+constexpr double rate_min_hz = 0.01, rate_max_hz = 100'000;
+constexpr double exposure_max = 1e15;  // whole numbers up to it are exact
 
 uint64_t machine_ns() {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
@@ -184,12 +185,12 @@ Result<std::unique_ptr<Camera>> open_fake_camera(const std::string& text, uint32
         const double value = std::strtod(number.c_str(), &end);
         if (number.empty() || *end != 0 || !(value >= 0)) return wrong(part);
         if (is_first) {
-            if (value > rate_max_hz) return wrong(part);
+            if (value > rate_max_hz || (value > 0 && value < rate_min_hz)) return wrong(part);
             options.rate_hz = value;
             continue;
         }
         const auto name = names.find(part.substr(0, at));
-        if (name == names.end() || value != std::floor(value)) return wrong(part);
+        if (name == names.end() || value != std::floor(value) || value > exposure_max) return wrong(part);
         options.faults[uint64_t(value)] = name->second;
     }
     return std::unique_ptr<Camera>(std::make_unique<FakeCamera>(std::move(options), index));

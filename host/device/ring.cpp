@@ -215,20 +215,19 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     const uint32_t start = header.asked.load(std::memory_order_relaxed) + 1;
     header.asked.store(start, std::memory_order_release);
     header.running.store(1, std::memory_order_release);
-    uint32_t last_seen = header.head_futex.load(std::memory_order_acquire);
-    for (auto since = Clock::now(); header.started.load(std::memory_order_acquire) != start;) {
-        // Makes room for a frame that the writer still waits to write for the start before.
-        header.tail.store(header.head.load(std::memory_order_acquire), std::memory_order_release);
-        futex_wake(header.tail_futex);
+    // A writer that waits for room sees that what it waits with is not wanted any more. Room is made when it has answered: what
+    // it writes after that is not to be let go of.
+    futex_wake(header.tail_futex);
+    const auto until = Clock::now() + std::chrono::milliseconds(patience_ms);
+    while (header.started.load(std::memory_order_acquire) != start) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
         if (header.started.load(std::memory_order_acquire) == start) break;
+        if (header.running.load(std::memory_order_acquire) == 0) return fail("the camera was stopped while it started");
         if (writer() != Writer::live)
             return fail("the camera is gone: the program that fills its ring has ended; start it again");
-        if (seen != last_seen) since = Clock::now();
-        if (Clock::now() - since > std::chrono::milliseconds(patience_ms))
+        if (Clock::now() > until)
             return fail(
-                "the camera does not start: the program that fills its ring does nothing; start that one again");
-        last_seen = seen;
+                "the camera does not start: the program that fills its ring gives no answer; start that one again");
         futex_wait(header.head_futex, seen, 100);
     }
     header.tail.store(header.started_head.load(std::memory_order_relaxed), std::memory_order_release);
@@ -282,6 +281,7 @@ uint64_t RingReader::dropped() const {
 bool RingReader::has_frames() const {
     const RingHeader& header = *mapping_->header;
     return header.running.load(std::memory_order_acquire) &&
+           header.asked.load(std::memory_order_acquire) == header.started.load(std::memory_order_acquire) &&
            header.head.load(std::memory_order_acquire) != header.tail.load(std::memory_order_acquire);
 }
 

@@ -116,7 +116,7 @@ class RingReader {
     uint32_t slots() const;
 
     // Has the camera started; what lies in the ring from before is let go of. Returns the camera's time. Fails when the
-    // writer goes, or does nothing at all for `patience_ms`.
+    // writer goes, when it does not answer within `patience_ms`, or when stop() is called meanwhile.
     Result<uint64_t> start(int patience_ms);
     void stop();
 

@@ -21,10 +21,10 @@ struct Place {
 
 Result<Place> place_of(const std::string& name, const fs::path& path) {
     std::error_code error;
-    const fs::path normal = fs::absolute(path, error).lexically_normal();
-    const fs::path folder = fs::canonical(normal.parent_path(), error);
+    // Not normalised as text first: what "link/.." is, only the file system knows.
+    const fs::path folder = fs::canonical(fs::absolute(path, error).parent_path(), error);
     if (error) return fail("cannot write '" + name + "': check that the folder exists");
-    return Place{name, folder / normal.filename()};
+    return Place{name, folder / path.filename()};
 }
 
 bool is_regular(const fs::path& path) {

@@ -38,7 +38,7 @@ const char* what_stands_there(const fs::file_status& status) {
 // The archive that a place lies in, empty for none.
 fs::path archive_around(const fs::path& place) {
     std::error_code error;
-    fs::path folder = fs::weakly_canonical(fs::absolute(place, error).lexically_normal().parent_path(), error);
+    fs::path folder = fs::weakly_canonical(fs::absolute(place, error).parent_path(), error);
     while (!folder.empty()) {
         if (fs::exists(folder / journal_name, error) && fs::exists(folder / manifest_name, error)) return folder;
         if (folder == folder.parent_path()) break;
@@ -113,7 +113,7 @@ Result<fs::path> output_place(const std::string& path) {
 }
 
 Result<fs::path> new_folder_place(const std::string& path) {
-    fs::path place = fs::path(path).lexically_normal();
+    fs::path place = path;
     if (!place.has_filename()) place = place.parent_path();  // "lamps/"
     std::error_code error;
     if (fs::exists(fs::symlink_status(place, error)))

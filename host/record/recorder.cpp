@@ -157,15 +157,18 @@ class Recording {
         identifier_.end_log(end.why);
         log_ended_ = true;
         log_end_watermark_ns_ = last_watermark_ns_;
-        if (camera_state_.kind != CameraState::live) finish(camera_state_.why);
+        // A camera that is live may have more to give, and says so at its next pause.
+        if (camera_state_.kind != CameraState::live) finish_if_all_came();
     }
     void take(CameraPause pause) {
         report_.clock_drift_ppm = identifier_.placer().drift_ppm().value_or(report_.clock_drift_ppm);
         silent_looks_ = pause.watermark_ns == last_watermark_ns_ ? silent_looks_ + 1 : 0;
         last_watermark_ns_ = pause.watermark_ns;
         camera_state_ = std::move(pause.state);
-        if (!log_ended_) return;  // the board still tells of triggers whose frames came
-        if (has_delivered_all(pause.watermark_ns))
+        if (log_ended_) finish_if_all_came();  // else the board still tells of triggers whose frames came
+    }
+    void finish_if_all_came() {
+        if (has_delivered_all(last_watermark_ns_))
             finish("");
         else if (camera_state_.kind != CameraState::live)
             finish(camera_state_.why);

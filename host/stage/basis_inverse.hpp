@@ -25,8 +25,9 @@ struct MatrixFigures {
 MatrixFigures matrix_figures(const Basis& basis);
 
 // Gives the basis one image a lamp that is lit, and the pseudo-inverse of its light (Golub and Van Loan, "Matrix
-// Computations", 4th ed., 5.5.2) as its inversion. With singular values that count as zero the
-// images are an estimate (is_estimate), the shortest vector of lamps that explains the rows. Error: a condition number above condition_max, with advice.
+// Computations", 4th ed., 5.5.2) as its inversion. With singular values that count as zero the images are an estimate
+// (is_estimate), the shortest vector of lamps that explains the rows. Error: a condition number above condition_max, with
+// advice.
 Result<Basis> with_least_squares(Basis basis);
 
 }  // namespace ols

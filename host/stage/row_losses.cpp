@@ -2,6 +2,7 @@
 // The projector on the residuals by Eigen's complete orthogonal decomposition, and small sets of rows by Cholesky's.
 #include "stage/row_losses.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <array>
 #include <cassert>
@@ -13,9 +14,6 @@
 namespace ols {
 
 namespace {
-
-// A pivot below this, of a projector whose largest entry is about d / rows: rounding.
-constexpr double pivot_least = 1e-9;
 
 using Decomposition = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>;
 
@@ -63,33 +61,23 @@ RowLosses::RowLosses(const Basis& basis) : residual_(no_residual(basis)) {
 
 double RowLosses::noise_gain(std::span<const int> rows) const {
     assert(rows.size() <= rows_max);
+    if (rows.empty()) return 1;
     if (int(rows.size()) > redundancy()) return std::numeric_limits<double>::infinity();
-    double lower[rows_max][rows_max] = {}, inverse[rows_max][rows_max] = {};  // (I - H)_MM = lower lower'
-    double gain = 1;
-    for (size_t i = 0; i < rows.size(); ++i) {
-        for (size_t j = 0; j <= i; ++j) {
-            double left = residual_.projector(rows[i], rows[j]);
-            for (size_t k = 0; k < j; ++k) left -= lower[i][k] * lower[j][k];
-            if (i == j && left < pivot_least) return std::numeric_limits<double>::infinity();
-            lower[i][j] = i == j ? std::sqrt(left) : left / lower[j][j];
-        }
-        for (size_t j = 0; j <= i; ++j) {
-            double left = i == j;
-            for (size_t k = j; k < i; ++k) left -= lower[i][k] * inverse[k][j];
-            inverse[i][j] = left / lower[i][i];
-        }
-        for (size_t j = 0; j <= i; ++j)
-            for (size_t k = 0; k <= i; ++k) gain += inverse[i][j] * inverse[i][k] * spread_(rows[j], rows[k]);
-    }
-    return gain;
+    using Part = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, rows_max, rows_max>;  // no allocation
+    const Part residual = residual_.projector(rows, rows), spread = spread_(rows, rows);
+    const Eigen::LLT<Part> factor(residual);
+    const Part lower = factor.matrixL();
+    if (factor.info() != Eigen::Success || lower.diagonal().cwiseAbs2().minCoeff() < pivot_least)
+        return std::numeric_limits<double>::infinity();
+    return 1 + factor.solve(spread).trace();
 }
 
 std::vector<int> RowLosses::classes() const {
     std::vector<int> class_of(size_t(rows()), -1), first_rows;
     for (int row = 0; row < rows(); ++row) {
-        if (!makes_up_for(std::array{row})) continue;
+        if (!std::isfinite(noise_gain(std::array{row}))) continue;
         size_t c = 0;
-        while (c < first_rows.size() && makes_up_for(std::array{first_rows[c], row})) ++c;
+        while (c < first_rows.size() && std::isfinite(noise_gain(std::array{first_rows[c], row}))) ++c;
         if (c == first_rows.size()) first_rows.push_back(row);
         class_of[size_t(row)] = int(c);
     }

@@ -26,7 +26,11 @@ struct RowResidual {
 
 RowResidual row_residual(const Basis& basis);
 
-// Beyond ten times the noise a set of rows counts as lost.
+// A pivot of (I - H)_MM below this is rounding, as the largest entry is about d / rows: the set M is not solvable.
+constexpr double pivot_least = 1e-9;
+
+// Beyond ten times the noise an order of play counts a set of rows as lost, and so do reports. A take that loses it is solved all the
+// same, and its noise gain tells at what cost.
 constexpr double bearable_noise_gain = 100;
 
 class RowLosses {
@@ -43,9 +47,10 @@ class RowLosses {
     double noise_gain(std::span<const int> rows) const;
     bool makes_up_for(std::span<const int> rows) const { return noise_gain(rows) <= bearable_noise_gain; }
 
-    // The class of each row, counted from 0 in the order of their first rows; -1 for a row that cannot be made up for even
-    // alone. Of two rows of one class the loss cannot be made up for, of two of different classes it can. There are such
-    // classes in any basis: with I - H = N N', two rows cannot both be spared where their rows of N are parallel.
+    // The class of each row, counted from 0 in the order of their first rows; -1 for a row that the others do not determine even
+    // alone. The loss of two rows of one class cannot be made up for at any cost in noise, that of two of different classes
+    // can. There are such classes in any basis: with I - H = N N', two rows cannot both be spared where their rows of N are
+    // parallel.
     std::vector<int> classes() const;
 
   private:

@@ -88,7 +88,8 @@ class LostBursts {
     }
 
   private:
-    static constexpr size_t longest = 3;
+    static constexpr size_t longest = 3;  // beginning_at() looks at three rows
+    static_assert(longest == RowLosses::rows_max);
 
     bool is_lost(int i, int j) const { return lost_pairs_[size_t(i) * rows_ + size_t(j)]; }
 

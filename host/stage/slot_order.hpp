@@ -11,8 +11,8 @@ namespace ols {
 
 // The row that stands at each of `places`: slot numbers of a cycle of `slots` slots, ascending, one for each row.
 //
-// First of all, what is lost in a hiccup is neighbouring rows. As few neighbours as can be are such that the other rows do not make
-// up for the two (stage/row_losses.hpp); then as few threes in a row and pairs at distance two. The last row's neighbour is the
+// First of all, what is lost in a hiccup is neighbouring rows. As few neighbours as swaps of two rows reach are such that the other rows do
+// not make up for the two (stage/row_losses.hpp); then as few threes in a row and pairs at distance two. The last row's neighbour is the
 // first. A basis that cannot spare two rows has no say in this, nor one whose rows are images of their own.
 //
 // Among orders that are equal in that, least is the sum over lamps of the periodic L2 discrepancy of the lamp's light over the cycle:

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "image/outputs.hpp"
 #include "image/whole_file.hpp"
 #include "stage/basis_file.hpp"
 #include "stage/row_losses.hpp"
@@ -67,9 +68,15 @@ nlohmann::json to_json(const Sequence& sequence) {
 }
 
 Result<int> run(const Options& options) {
+    const Status writable = check_outputs(
+        {.inputs = {options.sequence.path, options.sequence.basis, options.stage}, .files = {options.output}});
+    if (!writable.ok()) return writable.error();
     const auto sequence = compile(options);
     if (!sequence.ok()) return sequence.error();
-    const std::string text = options.json ? to_json(*sequence).dump() + "\n" : to_csv(*sequence);
+    // Names of files may not be UTF-8; that is replaced, not thrown at.
+    const auto replaced = nlohmann::json::error_handler_t::replace;
+    const std::string text =
+        options.json ? to_json(*sequence).dump(-1, ' ', false, replaced) + "\n" : to_csv(*sequence);
     if (options.output.empty()) {
         fmt::print("{}", text);
         return 0;

@@ -11,7 +11,9 @@ namespace ols {
 std::string describe_lost_slots(const Sequence& sequence) {
     if (is_one_image_a_row(sequence.basis)) return "each is one missing image, and no other image suffers";
     const RowLosses losses(sequence.basis);
-    if (losses.redundancy() == 0) return "none is made up for by the others: one that is lost costs the target";
+    if (losses.redundancy() == 0)
+        return "none is made up for by the others: one that is lost costs the target, unless it is "
+               "estimated or taken from a neighbouring cycle";
     std::string text;
     for (const BurstLoss& burst : measure_bursts(losses, sequence.order_of_play())) {
         text += text.empty() ? "" : "; ";

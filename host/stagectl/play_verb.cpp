@@ -82,7 +82,7 @@ Result<int> run(const Options& options) {
         fmt::print(stderr, "; {} edges, {} of them missed", uint32_t(status->edges_seen),
                    uint32_t(status->edges_missed));
     fmt::print(stderr, "\n");
-    if (status->fault != OLS_FAULT_NONE) return fail(account.end.why);
+    if (!account.end.why.empty() && !stop_on_signal()) return fail(account.end.why);
     return account.unseen() ? 2 : 0;
 }
 

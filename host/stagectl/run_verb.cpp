@@ -2,6 +2,8 @@
 // stagectl run: plays a sequence and records the take.
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "develop/basis_record.hpp"
 #include "image/line_file.hpp"
 #include "image/outputs.hpp"
@@ -140,15 +142,12 @@ void print_report(const TakeReport& report, bool is_estimate, const std::vector<
                    planned[0].archive.folder());
 }
 
-// The account of identified frames, a JSON line each.
-Result<LineFile> open_account(const Options& options) {
-    const Status writable = check_outputs(
+// The account of identified frames, a JSON line each. It is opened with the first of them, so that a start that fails leaves an
+// older one as it is.
+Status check_account(const Options& options) {
+    return check_outputs(
         {.inputs = {options.sequence.path, options.sequence.basis, options.links.stage_path, options.calibration},
          .streams = {options.frames}});
-    if (!writable.ok()) return writable.error();
-    LineFile account(options.frames);
-    if (const Status opened = account.status(); !opened.ok()) return opened.error();
-    return account;
 }
 
 void add_to_account(LineFile& account, const Frame& frame) {
@@ -253,16 +252,19 @@ Result<int> run(const Options& options) {
     say_exact_rate(options, *sequence, *targets);
     warn_of_long_cycles(*sequence, *targets);
     warn_of_flicker(*sequence);
-    auto account = open_account(options);
-    if (!account.ok()) return account.error();
+    if (const Status writable = check_account(options); !writable.ok()) return writable.error();
     auto planned = plan_outputs(options, *sequence, *stage, *targets);
     if (!planned.ok()) return planned.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
 
     const TakeDescription take{*sequence, *stage, *calibration, masks_of(options)};
+    std::optional<LineFile> account;
     TakeSinks sinks{{},
-                    [&](const Frame& frame) { add_to_account(*account, frame); },
+                    [&](const Frame& frame) {
+                        if (!account) account.emplace(options.frames);
+                        add_to_account(*account, frame);
+                    },
                     [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }};
     for (Planned& one : *planned) sinks.outputs.push_back({one.archive, one.targets});
     const auto report = run_take(take, {*session->board, {session->camera.get()}}, sinks, stop_on_signal());
@@ -270,7 +272,8 @@ Result<int> run(const Options& options) {
     print_report(*report, sequence->basis.is_estimate, *planned, options);
     if (options.json) print_json(to_json(*report, *planned));
     // The take is finished first, whatever became of its account.
-    if (const Status told = account->finish(); !told.ok()) return told.error();
+    if (account)
+        if (const Status told = account->finish(); !told.ok()) return told.error();
     int missing = 0;
     for (const OutputReport& output : report->outputs) {
         if (!output.write_error.empty()) return 1;
@@ -291,7 +294,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
         "         stagectl run --basis triangle --board usb: --camera ring:run/cam0.ring --calibration cal -o "
         "take.rfa\n"
         "Ctrl-C turns the light off and finishes the archive with what was recorded; a second one ends at once.\n"
-        "Exit codes: 0 every slot was recorded; 1 an error; 2 the archive is finished, and slots or targets are "
+        "Exit codes: 0 every slot and target is there; 1 an error; 2 the archive is finished, and slots or targets are "
         "missing.\nFlashing light can trigger seizures: see `stagectl sequence`.");
     options->sequence.add_to(*verb, "--sequence");
     verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")

@@ -53,8 +53,9 @@ Error which_board() {
 
 void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
     verb.add_option("--stage", stage_path, "stage.toml; without it, the default stage");
-    verb.add_option("--board", board,
-                    "the board, usb:, usb:SERIAL or socket:PATH; otherwise stage.toml's [board] link");
+    verb.add_option(
+        "--board", board,
+        "the board, usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera)
         verb.add_option("--camera", camera, "the camera, ring:PATH or fake:RATE; otherwise stage.toml's camera source");
     verb.add_option("--wait", wait_s,

@@ -139,6 +139,8 @@ def add_targets(take):
         (take / file).write_bytes((take / target["file"]).read_bytes())
         journal.append(target | {"index": index, "file": file})
     journal.append({"event": "missing", "camera": 0, "index": 2, "why": "lost", "detail": None})
+    journal.append({"event": "missing", "camera": 0, "index": 4, "through": 9, "why": "stopped"})
+    journal.append({"event": "expect", "camera": 0, "targets": 12})
     (take / "journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in [*journal, end]))
 
 
@@ -147,8 +149,8 @@ def test_all_targets_are_exported_under_the_names_that_relight_gives_them(take, 
     done = subprocess.run([BIN / "rf", "export", take, "--target", "all", "-o", tmp_path / "lamps", "--contact-sheet",
                            tmp_path / "sheet.png", "--json"], capture_output=True, text=True, check=True)
     report = json.loads(done.stdout)
-    assert [entry["target"] for entry in report["targets"]] == [0, 1, 3] and report["missing_targets"] == [2]
-    assert "1 targets are missing" in done.stderr
+    assert [entry["target"] for entry in report["targets"]] == [0, 1, 3] and report["missing_targets"] == [{"index": 2}, {"index": 4, "through": 9}, {"index": 10, "through": 11}]
+    assert "9 targets are missing" in done.stderr and "target 2, targets 4 to 9, targets 10 to 11" in done.stderr
     relight(take, "--target", "all", "-o", tmp_path / "relit.exr")
     for index in (0, 1, 3):
         assert (tmp_path / f"relit_{index:06}.exr").exists() and (tmp_path / f"sheet_{index:06}.png").exists()

@@ -67,7 +67,7 @@ TEST_F(OutputFiles, a_file_of_a_folder_that_is_read_is_refused_by_its_hard_link)
 TEST_F(OutputFiles, nothing_is_put_into_an_archive_whether_it_is_read_or_not) {
     fs::create_directory_symlink(path("take.rfa/cam0"), path("elsewhere"));
     for (const auto& name : {path("take.rfa/manifest.json"), path("take.rfa/cam0/new.exr"), path("elsewhere/new.exr"),
-                             path("take.rfa/../take.rfa/new")}) {
+                             path("take.rfa/../take.rfa/new"), path("elsewhere/../manifest.json")}) {
         expect_refused({.files = {name}}, "archive");
         expect_refused({.folders = {name + "_folder"}}, "archive");
         expect_refused({.streams = {name}}, "archive");

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Processes of the demo: a virtual stage that stays up while the daemon records from it, and programs that print JSON."""
+import atexit
 import json
 import os
 import signal
@@ -91,6 +92,7 @@ class VirtualStage:
     def __enter__(self):
         with open(self.log, "w") as log:
             self.process = subprocess.Popen([str(part) for part in self.command], cwd=ROOT, stdout=log, stderr=log)
+        atexit.register(self.__exit__)  # also when a step fails
         while not (self.work / "board.sock").exists():  # it appears when everything is ready
             if self.process.poll() is not None:
                 sys.exit(f"demo: the virtual stage ended early; it said:\n{self.log.read_text()}")

@@ -127,7 +127,7 @@ Status run(const Options& options) {
     if (!targets) return targets.error();
     if (const auto writable = check_places(options, targets->finished); !writable) return writable;
     if (const auto warning = targets->warning(); !warning.empty()) fmt::print(stderr, "rf export: {}\n", warning);
-    nlohmann::json report = {{"archive", options.archive}, {"missing_targets", targets->missing}};
+    nlohmann::json report = {{"archive", options.archive}, {"missing_targets", targets->missing_json()}};
     for (const auto& entry : targets->finished) {
         Export exporting{*archive, entry, options};
         if (const auto done = exporting.write(); !done) return done;

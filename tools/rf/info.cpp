@@ -44,11 +44,12 @@ json archive_report(const ArchiveReader& archive, const std::string& path) {
     json report = archive.manifest();
     report["path"] = path;
     report["finished"] = archive.finished();
+    report["being_written"] = archive.being_written();
     report["lamps"] = archive.info().lights.size();
     report["targets"] = json::array();
     for (const auto& entry : archive.targets()) report["targets"].push_back(target_report(archive, entry));
     for (TargetEntry run : archive.undecided()) {
-        run.why_missing = "never finished: the recording was interrupted";
+        run.why_missing = archive.being_written() ? "to come" : "never finished: the recording was interrupted";
         report["targets"].push_back(target_report(archive, run));
     }
     return report;
@@ -80,7 +81,9 @@ std::string basis_line(const json& basis) {
 
 void print_report(const json& report, const TakeInfo& info) {
     fmt::print("{}: {}\n", report["path"].get<std::string>(),
-               report["finished"] ? "finished" : "NOT FINISHED: the recording was interrupted, see rf verify");
+               report["finished"]        ? "finished"
+               : report["being_written"] ? "being recorded"
+                                         : "NOT FINISHED: the recording was interrupted, see rf verify");
     fmt::print("  lamps      {}{}\n", info.lights.size(),
                info.basis.empty() ? ", photographed one by one" : ", basis " + info.basis);
     if (const json& basis = info.extra.value("basis", json()); basis.is_object())

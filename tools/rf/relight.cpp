@@ -186,7 +186,7 @@ Status run(const Options& options) {
     nlohmann::json report = lighting->report;
     report["archive"] = options.archive;
     report["lamps"] = cells->size();
-    report["missing_targets"] = targets->missing;
+    report["missing_targets"] = targets->missing_json();
     for (const auto& entry : targets->finished) {
         const auto done = relight_and_write(*archive, entry, *lighting, options);
         if (!done) return done.error();

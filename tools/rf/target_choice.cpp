@@ -18,9 +18,23 @@ void TargetOptions::add_to(CLI::App& verb) {
 
 std::string TargetChoice::warning() const {
     if (missing.empty()) return "";
-    return fmt::format(
-        "{} targets are missing in the archive and left out, and their numbers with them: {}; rf info says why",
-        missing.size(), fmt::join(missing, ", "));
+    uint64_t count = 0;
+    std::vector<std::string> runs;
+    for (const TargetEntry& run : missing) {
+        count += uint64_t(run.last) - run.index + 1;
+        runs.push_back(target_words(run));
+    }
+    return fmt::format("{} {} missing in the archive and left out, and the numbers with them: {}; rf info says why",
+                       count, count == 1 ? "target is" : "targets are", fmt::join(runs, ", "));
+}
+
+nlohmann::json TargetChoice::missing_json() const {
+    auto runs = nlohmann::json::array();
+    for (const TargetEntry& run : missing) {
+        runs.push_back({{"index", run.index}});
+        if (run.last > run.index) runs.back()["through"] = run.last;
+    }
+    return runs;
 }
 
 Result<TargetChoice> choose_targets(const ArchiveReader& archive, const std::string& path,
@@ -29,10 +43,12 @@ Result<TargetChoice> choose_targets(const ArchiveReader& archive, const std::str
     for (const auto& entry : archive.targets()) {
         if (entry.camera != options.camera) continue;
         if (entry.file.empty())
-            all.missing.push_back(entry.index);
+            all.missing.push_back(entry);
         else
             all.finished.push_back(entry);
     }
+    for (const auto& run : archive.undecided())
+        if (run.camera == options.camera) all.missing.push_back(run);
     if (all.finished.empty())
         return fail(
             fmt::format("'{}' has no finished target of camera {}: see `rf info {}`", path, options.camera, path));

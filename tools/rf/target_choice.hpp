@@ -20,10 +20,11 @@ struct TargetOptions {
 
 struct TargetChoice {
     std::vector<TargetEntry> finished;  // at least one
-    std::vector<uint32_t> missing;      // with `all`: what the recording noted as missing
+    std::vector<TargetEntry> missing;   // with `all`: runs that the recording noted as missing, or did not come to
 
-    // What to tell of the missing ones; empty for none.
+    // What to tell of the missing ones, empty for none; and [{"index", "through" of a run of several}].
     std::string warning() const;
+    nlohmann::json missing_json() const;
 };
 
 // Errors name the archive and `rf info`, which lists what there is.

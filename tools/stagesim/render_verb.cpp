@@ -181,7 +181,7 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     light->add_flag("--all-lamps", options->all_lamps, "every lamp of the sphere at 1");
     light->add_option("--weights", options->weights, "JSON file {\"weights\": [w or [r, g, b], ...]}");
     light->add_option("--env", options->env, "environment map (.exr, .hdr): lamps weighted as `rf relight` does");
-    light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
+    auto* olat = light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
     light->require_option(1);
     verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
     verb->add_option("--rotate", options->rotate_deg,
@@ -190,11 +190,11 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene");
     verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));
     verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
-    verb->add_option("--png", options->png, "preview file");
+    verb->add_option("--png", options->png, "preview file, of one picture")->excludes(olat);
     verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve");
     verb->add_flag("--json", options->json, "print what was written as JSON");
     verb->callback([options, &exit_code] {
-        const Status status = options->out.empty() && (options->png.empty() || options->olat)
+        const Status status = options->out.empty() && options->png.empty()
                                   ? Status(fail("nothing to write: give -o FILE.exr or --png FILE.png"))
                                   : render(*options);
         if (status) return;

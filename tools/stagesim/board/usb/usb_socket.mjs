@@ -58,21 +58,33 @@ export class UsbSocket {
     this.#server.close();
   }
 
+  /** A client that reconnects may be seen before its old connection's end is: waits for that, for a moment. */
+  #acceptLater(socket) {
+    const client = this.#client;
+    const settle = () => {
+      clearTimeout(patience);
+      client.off('close', handOver);
+      socket.off('close', settle);
+    };
+    const handOver = () => {
+      settle();
+      this.#accept(socket);
+    };
+    const patience = setTimeout(() => {
+      settle();
+      this.#log('usb: a second client was turned away');
+      turnAway(socket);
+    }, HANDOVER_MS);
+    client.once('close', handOver);
+    socket.once('close', settle);
+  }
+
   #accept(socket) {
     socket.on('error', () => {}); // 'close' follows
     if (this.#client !== null) {
-      // A client that reconnects may be seen before its old connection's end is.
-      this.#client.once('close', () => {
-        clearTimeout(patience);
-        this.#accept(socket);
-      });
-      const patience = setTimeout(() => {
-        this.#log('usb: a second client was turned away');
-        turnAway(socket);
-      }, HANDOVER_MS);
+      this.#acceptLater(socket);
       return;
     }
-    if (socket.destroyed || socket.writableEnded) return;
     this.#client = socket;
     this.#onClient(true);
     socket.on('data', (bytes) => {
