@@ -37,15 +37,6 @@ Status rename_durably(const std::string& from, const std::string& to) {
     return sync_directory(std::filesystem::path(to).parent_path());
 }
 
-Status sync_file(const std::string& path) {
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return disk_error("open", path, errno);
-    const int error = fsync(fd) == 0 ? 0 : errno;
-    ::close(fd);
-    if (error != 0) return disk_error("sync", path, error);
-    return Done{};
-}
-
 namespace {
 
 // 0, or the error number of the write that failed.

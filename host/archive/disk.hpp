@@ -18,9 +18,6 @@ Error disk_error(const std::string& action, const std::string& path, int error_n
 // Writes all of `text`; a reader sees the old file or the new one, never a part.
 Status write_file_durably(const std::string& path, const std::string& text);
 
-// Makes what another function wrote into a file last.
-Status sync_file(const std::string& path);
-
 // Gives a file that is already synced its final name, for good.
 Status rename_durably(const std::string& from, const std::string& to);
 

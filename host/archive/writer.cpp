@@ -126,7 +126,6 @@ std::string text_of(const nlohmann::json& manifest) {
 Result<JournalWriter> begin_archive(const fs::path& root, const TakeInfo& info) {
     const std::string lights_path = (root / lights_name).string();
     if (auto s = write_lp(lights_path, named_by_layer(info.lights)); !s) return s.error();
-    if (auto s = sync_file(lights_path); !s) return s.error();
     const auto lights = checksum_file(lights_path);
     if (!lights) return lights.error();
     if (auto s = write_file_durably((root / manifest_name).string(), text_of(manifest_of(info))); !s) return s.error();

@@ -145,6 +145,38 @@ TEST_F(ArchivePlaces, a_file_that_is_no_archives_is_kept_and_named_before_anythi
     EXPECT_TRUE(std::filesystem::exists(path + "/notes.txt"));
 }
 
+TEST_F(ArchivePlaces, a_folder_that_came_in_the_place_of_the_old_take_is_kept_and_so_are_files_that_came_into_it) {
+    for (const bool is_other_folder : {true, false}) {
+        std::filesystem::remove_all(directory + "/.take.rfa.recording");
+        std::filesystem::remove_all(path);
+        write_old_take();
+        auto fresh = ArchiveWriter::create_beside(path, take_info(3), true);
+        ASSERT_TRUE(fresh.ok()) << fresh.error().message;
+        if (is_other_folder) {
+            std::filesystem::rename(path, path + ".moved");
+            std::filesystem::create_directory(path);
+        }
+        std::ofstream(path + "/mine") << "mine";
+        const auto placed = fresh->take_place();
+        ASSERT_FALSE(placed.ok());
+        EXPECT_NE(placed.error().message.find(".take.rfa.recording"), std::string::npos) << placed.error().message;
+        EXPECT_TRUE(std::filesystem::exists(directory + "/.take.rfa.recording/mine"));
+        EXPECT_EQ(fresh->folder(), path);
+        EXPECT_TRUE(fresh->finish().ok());
+    }
+}
+
+TEST_F(ArchivePlaces, targets_that_were_left_beside_are_not_emptied_away_by_an_overwrite) {
+    write_old_take();
+    std::filesystem::create_directories(directory + "/.take.rfa.recording/cam0");
+    std::ofstream(directory + "/.take.rfa.recording/cam0/target_000000.exr") << "a target";
+    const auto refused = ArchiveWriter::create_beside(path, take_info(3), true);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_NE(refused.error().message.find("rename it to keep them"), std::string::npos) << refused.error().message;
+    EXPECT_TRUE(std::filesystem::exists(directory + "/.take.rfa.recording/cam0/target_000000.exr"));
+    EXPECT_TRUE(old_take_is_whole());
+}
+
 TEST_F(ArchivePlaces, a_recording_whose_name_was_taken_meanwhile_stays_beside_and_is_finished_there) {
     auto writer = ArchiveWriter::create_beside(path, take_info(2), false);
     std::filesystem::create_directory(path);
@@ -161,7 +193,8 @@ TEST_F(ArchivePlaces, a_recording_whose_name_was_taken_meanwhile_stays_beside_an
 TEST_F(ArchivePlaces, the_lamps_are_on_the_disk_before_the_journal_vouches_for_them) {
     synced.clear();
     ASSERT_TRUE(ArchiveWriter::create(path, take_info(2)).ok());
-    const auto lights = std::find(synced.begin(), synced.end(), "lights.lp");
+    // Under whatever name it has before it is renamed.
+    const auto lights = std::ranges::find_if(synced, [](const auto& name) { return name.starts_with("lights.lp"); });
     const auto journal = std::find(synced.begin(), synced.end(), "journal.jsonl");
     ASSERT_NE(lights, synced.end());
     EXPECT_LT(lights, journal);

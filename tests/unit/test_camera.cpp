@@ -160,7 +160,7 @@ TEST_F(RingOfStaleFrames, a_flood_of_them_does_not_keep_a_read_from_its_time_out
     EXPECT_EQ(camera_->state().kind, CameraState::live);
 }
 
-TEST(RingCamera, a_program_that_does_nothing_is_given_up_at_the_start) {
+TEST(RingCamera, a_program_that_gives_no_answer_is_given_up_at_the_start) {
     RingRig rig;
     auto reader = RingReader::open(rig.path());
     ASSERT_TRUE(reader.ok());
@@ -168,7 +168,7 @@ TEST(RingCamera, a_program_that_does_nothing_is_given_up_at_the_start) {
     const auto started = reader->start(50);
     kill(rig.process(), SIGCONT);
     ASSERT_FALSE(started.ok());
-    EXPECT_NE(started.error().message.find("does nothing"), std::string::npos) << started.error().message;
+    EXPECT_NE(started.error().message.find("gives no answer"), std::string::npos) << started.error().message;
 }
 
 TEST(FakeCamera, makes_frames_at_its_rate_and_loses_those_it_is_told_to) {
