@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: MIT
-// The once-subdivided icosahedron, and .lp reading and writing.
+// The once-subdivided icosahedron, and .lp writing.
 #include "stage/lamps.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numbers>
-#include <optional>
 
 #include "image/whole_file.hpp"
+#include "stage/light_file.hpp"
 
 namespace ols {
 
@@ -65,58 +63,6 @@ bool above(Vec3 a, Vec3 b) {
     return azimuth(a) < azimuth(b);
 }
 
-struct Word {
-    size_t begin, end;
-};
-
-std::vector<Word> words_of(const std::string& line) {
-    std::vector<Word> words;
-    for (size_t i = 0; (i = line.find_first_not_of(" \t", i)) != std::string::npos;) {
-        const size_t end = std::min(line.find_first_of(" \t", i), line.size());
-        words.push_back({i, end});
-        i = end;
-    }
-    return words;
-}
-
-// One coordinate with either decimal mark, whatever the locale.
-std::optional<double> coordinate(std::string text) {
-    std::replace(text.begin(), text.end(), ',', '.');
-    const char* begin = text.c_str() + (text.starts_with('+') ? 1 : 0);
-    const char* end = text.c_str() + text.size();
-    double value = 0;
-    const auto parsed = std::from_chars(begin, end, value);
-    if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
-
-// `name x y z`: the last three words are the coordinates, what stands before them is the name.
-std::optional<LightPosition> parse_light(const std::string& line) {
-    const auto words = words_of(line);
-    if (words.size() < 4) return std::nullopt;
-    double v[3];
-    for (int i = 0; i < 3; ++i) {
-        const Word word = words[words.size() - 3 + i];
-        const auto value = coordinate(line.substr(word.begin, word.end - word.begin));
-        if (!value) return std::nullopt;
-        v[i] = *value;
-    }
-    const Vec3 direction{v[0], v[1], v[2]};
-    if (!(length(direction) > 1e-9)) return std::nullopt;
-    const size_t name_end = words[words.size() - 4].end;
-    return LightPosition{line.substr(words[0].begin, name_end - words[0].begin), normalized(direction)};
-}
-
-std::optional<size_t> parse_count(const std::string& line) {
-    const auto words = words_of(line);
-    if (words.size() != 1) return std::nullopt;
-    size_t count = 0;
-    const char* end = line.data() + words[0].end;
-    const auto parsed = std::from_chars(line.data() + words[0].begin, end, count);
-    if (parsed.ec != std::errc() || parsed.ptr != end || count == 0) return std::nullopt;
-    return count;
-}
-
 }  // namespace
 
 std::vector<Vec3> full_sphere_directions() {
@@ -135,35 +81,11 @@ std::vector<Vec3> stage_lamp_directions() {
 }
 
 Result<std::vector<LightPosition>> read_lp(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) return fail("cannot open light positions '" + path + "': check the path");
-    std::string line;
-    int line_number = 0;
-    std::optional<size_t> count;
-    std::vector<LightPosition> lights;
-    while (std::getline(file, line)) {
-        ++line_number;
-        if (line_number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
-        if (line.ends_with('\r')) line.pop_back();
-        if (words_of(line).empty()) continue;
-        if (!count) {
-            count = parse_count(line);
-            if (!count)
-                return fail(fmt::format("{}:{}: '{}' is not the number of lights an .lp file begins with", path,
-                                        line_number, line));
-            continue;
-        }
-        const auto light = parse_light(line);
-        if (!light)
-            return fail(fmt::format("{}:{}: '{}' is no light: write `name x y z` with a direction that is not zero",
-                                    path, line_number, line));
-        lights.push_back(*light);
-    }
-    if (!count) return fail("'" + path + "' is empty: an .lp file begins with the number of lights");
-    if (lights.size() != *count)
-        return fail(fmt::format("{}: says {} lights and lists {}: correct the first line or add the missing lights",
-                                path, *count, lights.size()));
-    return lights;
+    auto file = read_light_file(path);
+    if (!file) return file.error();
+    if (!file->intensities.empty())
+        return fail("'" + path + "' has intensities behind the directions: only `stagectl ingest` uses them; remove them");
+    return std::move(file->lights);
 }
 
 std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions) {

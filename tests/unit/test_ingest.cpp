@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Ingest: pictures written by OpenCV come back as linear light by the closed form of sRGB; everything a real folder gets
 // wrong is named, and nothing is left behind.
-// links: ols_archive
-#include "archive/ingest.hpp"
+// links: ols_photographs
+#include "photographs/ingest.hpp"
 
 #include <gtest/gtest.h>
 
@@ -114,7 +114,7 @@ TEST_F(Ingest, half_float_archives_keep_linear_light_to_a_part_in_two_thousand) 
 }
 
 TEST_F(Ingest, linear_transfer_keeps_code_values) {
-    options.transfer = Transfer::linear;
+    options.picture.transfer = Transfer::linear;
     options.sample_type = SampleType::single_float;
     add_picture("a.png", 1, CV_8U, 1);
     write_lights({"a.png"});

@@ -22,6 +22,7 @@ UPSTREAM = {
     "image": set(),
     "stage": {"image"},
     "archive": {"image", "stage"},
+    "photographs": {"image", "stage", "archive"},
     "device": {"image", "stage"},
     "record": {"image", "stage", "device"},
     "flow": {"image"},
@@ -29,7 +30,7 @@ UPSTREAM = {
     "develop": {"image", "stage", "flow", "demultiplex"},
     "take": {"image", "stage", "device", "record", "develop", "archive"},
     "relight": {"image", "stage"},
-    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take"},
+    "stagectl": {"image", "stage", "archive", "photographs", "device", "record", "develop", "take"},
 }
 # Which rooms of host/ a program of tools/ may include.
 TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "archive", "relight"}, "stagesim": {"image", "stage", "flow", "relight"}}

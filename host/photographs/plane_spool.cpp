@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PlaneSpool with pread and pwrite.
-#include "archive/plane_spool.hpp"
+#include "photographs/plane_spool.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// Damage that decoders pass over with a warning, or without, found by the library that knows the format best; and what a file says
+// of its colours that OpenImageIO does not hand on.
+#pragma once
+
+#include <string>
+
+#include "photographs/color_label.hpp"
+#include "result.hpp"
+
+namespace ols {
+
+// Decodes a JPEG file's entropy-coded data and makes an error of every warning of libjpeg's: a code that is none, data cut short, bytes
+// left over before a marker. CMYK is refused. A changed bit that gives another valid code leaves no trace in this format.
+Status check_jpeg(const std::string& path);
+
+// Reads all chunks of a PNG file (W3C PNG, 3rd edition), checks their CRCs and that the file has its end, and returns what gAMA, cHRM,
+// sRGB and cICP say (11.3.2; iCCP is OpenImageIO's to hand on). Errors: damaged, or coded for a display (PQ, HLG) or in Y'CbCr.
+Result<ColorLabel> read_png_label(const std::string& path);
+
+inline constexpr int photometric_cfa = 32803, photometric_linear_raw = 34892;  // TIFF/EP, DNG
+
+struct TiffPage {
+    int photometric = 1;  // TIFF 6.0 section 8
+    int width = 0, height = 0;
+    ColorLabel label;  // TransferFunction, PrimaryChromaticities (section 20)
+};
+
+// The tags of all pages of a TIFF file. Errors: damaged, or a preview whose sub-directory holds the picture (a raw that LibRaw does not know).
+Result<std::vector<TiffPage>> read_tiff_pages(const std::string& path);
+
+// Reads all samples of page `page` (from 0) through libtiff, whose errors and warnings while decoding are errors here.
+Status check_tiff_page(const std::string& path, int page);
+
+}  // namespace ols

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+// OpenImageIO's ImageInput. What it passes over is looked after by file_damage.
+#include "photographs/picture_samples.hpp"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "photographs/file_damage.hpp"
+
+namespace ols {
+
+namespace {
+
+using OIIO::ImageInput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+struct OpenPicture {
+    std::unique_ptr<ImageInput> input;
+    ImageSpec spec;
+};
+
+std::string one_line(std::string text) {
+    std::ranges::replace(text, '\n', ' ');
+    while (text.ends_with(' ')) text.pop_back();
+    return text;
+}
+
+Error unreadable(const std::string& path, const std::string& why) {
+    return fail("cannot read '" + path + "': it is damaged or of an unusual kind" +
+                (why.empty() ? "" : " (" + one_line(why) + ")") + "; copy it again, or save it as PNG or TIFF");
+}
+
+Status check_size(const std::string& path, PictureFormat format, double width, double height, double bytes_a_pixel) {
+    std::error_code error;
+    const double file = double(std::filesystem::file_size(path, error));
+    const bool is_possible =
+        width >= 1 && height >= 1 && width <= 65535 && height <= 65535 && width * height <= 1 << 28;
+    const double bytes = width * height * bytes_a_pixel;
+    const bool is_likely = format == PictureFormat::heif ? bytes <= std::max(64e6, 2000 * file) : bytes <= 2000 * file;
+    if (is_possible && is_likely) return Done{};
+    return fail(fmt::format("'{}' says it is {:.0f} x {:.0f}: {}", path, width, height,
+                            is_possible ? fmt::format("{:.0f} bytes cannot hold that; it is damaged", file)
+                                        : "larger than any picture that is read (65535 a side, 268 million pixels)"));
+}
+
+Result<OpenPicture> open_picture(const std::string& path, PictureFormat format) {
+    auto input = ImageInput::create(format_name(format));
+    if (!input) return fail("this system's OpenImageIO does not read " + std::string(format_name(format)) + " files");
+    input->threads(1);  // pictures are read side by side
+    ImageSpec config, spec;
+    config.attribute("oiio:UnassociatedAlpha", 1);  // colours are not multiplied by alpha
+    if (!input->open(path, spec, config)) return unreadable(path, input->geterror());
+    return OpenPicture{std::move(input), spec};
+}
+
+// By an input of its own: some of OpenImageIO's do not come back from a page that is not there.
+int count_pages(const std::string& path, PictureFormat format) {
+    if (format != PictureFormat::heif && format != PictureFormat::webp) return 1;
+    const auto picture = open_picture(path, format);
+    int pages = 1;
+    while (picture.ok() && pages < 10000 && picture->input->seek_subimage(pages, 0)) ++pages;
+    return pages;
+}
+
+// Moves to the page that is meant.
+Status choose_page(OpenPicture& picture, const std::string& path, int pages, int page) {
+    if (page == 0 && pages > 1)
+        return fail(fmt::format("'{}' has {} pages: choose one with --page 1 to {}", path, pages, pages));
+    if (page > pages)
+        return fail(
+            fmt::format("'{}' has {} {}: there is no page {}", path, pages, pages == 1 ? "page" : "pages", page));
+    if (page > 1 && !picture.input->seek_subimage(page - 1, 0)) return unreadable(path, picture.input->geterror());
+    picture.spec = picture.input->spec();
+    return Done{};
+}
+
+// What of the channels is colour, alpha, or neither.
+Status sort_channels(const ImageSpec& spec, const std::string& path, PictureSamples& samples) {
+    samples.channels = spec.nchannels;
+    samples.alpha = spec.alpha_channel;
+    samples.is_multiplied = samples.alpha >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha", 0) == 0;
+    const std::string space = spec.get_string_attribute("tiff:ColorSpace");
+    if (!space.empty() && space != "YCbCr")
+        return fail("'" + path + "' is in " + space + " colours, which are no light: save it as R G B");
+    samples.colors = spec.nchannels <= 2 ? 1 : 3;
+    const int others = spec.nchannels - samples.colors;
+    if (spec.deep || spec.depth > 1 || spec.nchannels < 1 || others > 1 ||
+        (others == 1 && samples.alpha >= 0 && samples.alpha != samples.colors))
+        return fail(fmt::format("'{}' has {} channels: save it as grey or R G B", path, spec.nchannels));
+    if (others == 1)
+        samples.said.push_back(samples.alpha < 0 ? "a channel beside the colours is left out"
+                               : samples.is_multiplied
+                                   ? "alpha is left out; the colours are multiplied by it as the file has them"
+                                   : "alpha is left out");
+    return Done{};
+}
+
+double attribute(const ImageSpec& spec, const char* name) {
+    const double value = spec.get_float_attribute(name, 0);
+    return std::isfinite(value) && value > 0 ? value : 0;
+}
+
+void take_label(const ImageSpec& spec, PictureSamples& samples) {
+    if (const auto* profile = spec.find_attribute("ICCProfile")) {
+        const auto* bytes = static_cast<const uint8_t*>(profile->data());
+        samples.label = {};
+        samples.label.profile.assign(bytes, bytes + profile->datasize());
+        const std::string name = spec.get_string_attribute("ICCProfile:profile_description");
+        samples.label.name = name.empty() ? "its profile" : "its profile '" + one_line(name) + "'";
+    } else if (samples.label.name.empty() && spec.get_int_attribute("Exif:ColorSpace", 1) == 0xffff) {
+        // DCF 2.0: R03 is Adobe RGB; without it nobody knows.
+        samples.label.name = "its Exif colour space";
+        if (spec.get_string_attribute("Exif:InteroperabilityIndex") == "R03") {
+            samples.label.primaries = adobe_primaries;
+            samples.label.gamma = 563.0 / 256;
+        }
+    }
+}
+
+void take_metadata(const ImageSpec& spec, PictureSamples& samples) {
+    samples.exposure = {attribute(spec, "ExposureTime"), attribute(spec, "FNumber"),
+                        attribute(spec, "Exif:PhotographicSensitivity")};
+    if (samples.exposure.iso == 0) samples.exposure.iso = attribute(spec, "Exif:ISOSpeedRatings");
+    take_label(spec, samples);
+    const int x = spec.x - spec.full_x, y = spec.y - spec.full_y;
+    if (x != 0 || y != 0) samples.said.push_back("its place on a page is left out");
+    const double aspect = spec.get_float_attribute("PixelAspectRatio", 1);
+    if (std::abs(aspect - 1) > 1e-3)
+        samples.said.push_back(fmt::format("its pixels' aspect of {:g} is left out", aspect));
+}
+
+template <typename Code>
+Status read_codes(ImageInput& input, const std::string& path, TypeDesc type, PictureSamples& samples) {
+    std::vector<Code> codes(size_t(samples.width) * samples.height * samples.channels);
+    const bool done = input.read_image(input.current_subimage(), 0, 0, samples.channels, type, codes.data());
+    const std::string why = input.geterror();
+    if (!done || !why.empty()) return unreadable(path, why);
+    samples.codes = std::move(codes);
+    return Done{};
+}
+
+Status read_any_codes(OpenPicture& picture, const std::string& path, PictureSamples& samples) {
+    const auto type = picture.spec.format.basetype;
+    samples.is_integer = type != TypeDesc::HALF && type != TypeDesc::FLOAT && type != TypeDesc::DOUBLE;
+    if (samples.is_integer) {
+        const int bits = picture.spec.get_int_attribute("oiio:BitsPerSample", int(picture.spec.format.size() * 8));
+        const bool has_sign = type == TypeDesc::INT8 || type == TypeDesc::INT16 || type == TypeDesc::INT32;
+        samples.last_code = std::exp2(std::clamp(bits, 1, 32) - (has_sign ? 1 : 0)) - 1;
+    }
+    if (type == TypeDesc::UINT8) return read_codes<uint8_t>(*picture.input, path, TypeDesc::UINT8, samples);
+    if (type == TypeDesc::UINT16) return read_codes<uint16_t>(*picture.input, path, TypeDesc::UINT16, samples);
+    return read_codes<float>(*picture.input, path, TypeDesc::FLOAT, samples);
+}
+
+// White is zero (TIFF 6.0 section 8): OpenImageIO turns samples of 8 bits only.
+void invert(PictureSamples& samples) {
+    if (auto* codes = std::get_if<std::vector<uint16_t>>(&samples.codes))
+        for (auto& code : *codes) code = uint16_t(65535 - code);
+    if (auto* codes = std::get_if<std::vector<float>>(&samples.codes))
+        for (auto& code : *codes) code = 1 - code;
+}
+
+Status check_photometric(const TiffPage& page, const std::string& path) {
+    switch (page.photometric) {
+        case 0:
+        case 1:
+        case 2:
+        case 3:
+        case 6: return Done{};  // white or black is zero, R G B, palette, Y'CbCr
+        case 5: return fail("'" + path + "' is in CMYK, which is ink and no light: save it as R G B");
+        case 4: return fail("'" + path + "' is a transparency mask of another picture: save it as grey");
+        case photometric_cfa:
+        case photometric_linear_raw:
+            return fail("'" + path +
+                        "' is a sensor's raw mosaic without what a DNG file has to say of it: convert it to DNG");
+        default:
+            return fail(fmt::format("'{}' is in colours of another kind (photometric {}): save it as R G B", path,
+                                    page.photometric));
+    }
+}
+
+Result<PictureSamples> read_checked(const std::string& path, PictureFormat format, int page) {
+    PictureSamples samples;
+    std::vector<TiffPage> tiff_pages;
+    if (format == PictureFormat::jpeg)
+        if (auto s = check_jpeg(path); !s) return s.error();
+    if (format == PictureFormat::png) {
+        auto label = read_png_label(path);
+        if (!label) return label.error();
+        samples.label = std::move(*label);
+    }
+    if (format == PictureFormat::tiff) {
+        auto pages = read_tiff_pages(path);
+        if (!pages) return pages.error();
+        tiff_pages = std::move(*pages);
+    }
+    auto picture = open_picture(path, format);
+    if (!picture) return picture.error();
+    const int pages = tiff_pages.empty() ? count_pages(path, format) : int(tiff_pages.size());
+    if (auto s = choose_page(*picture, path, pages, page); !s) return s.error();
+    const ImageSpec& spec = picture->spec;
+    if (auto s = check_size(path, format, spec.width, spec.height, double(spec.pixel_bytes(true))); !s)
+        return s.error();
+    const size_t index = size_t(std::max(page, 1) - 1);
+    if (index < tiff_pages.size()) {
+        if (auto s = check_photometric(tiff_pages[index], path); !s) return s.error();
+        if (auto s = check_tiff_page(path, int(index)); !s) return s.error();
+        samples.label = tiff_pages[index].label;
+    }
+    samples.width = spec.width;
+    samples.height = spec.height;
+    if (auto s = sort_channels(spec, path, samples); !s) return s.error();
+    take_metadata(spec, samples);
+    samples.orientation = spec.get_int_attribute("Orientation", 1);
+    if (samples.orientation < 1 || samples.orientation > 8)
+        return fail(fmt::format("'{}' says its orientation is {}: the tag has 1 to 8; remove or correct it", path,
+                                samples.orientation));
+    if (auto s = read_any_codes(*picture, path, samples); !s) return s.error();
+    if (index < tiff_pages.size() && tiff_pages[index].photometric == 0) invert(samples);
+    return samples;
+}
+
+}  // namespace
+
+Result<PictureSamples> read_samples(const std::string& path, PictureFormat format, int page) {
+    try {
+        return read_checked(path, format, page);
+    } catch (const std::bad_alloc&) {
+        return fail("'" + path + "' does not fit into memory");
+    } catch (const std::exception& e) {
+        return unreadable(path, e.what());
+    }
+}
+
+}  // namespace ols
