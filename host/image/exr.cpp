@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-// One-part OpenEXR files through the library's InputFile and OutputFile.
+// Writing one-part OpenEXR files through the library's OutputFile. Reading: exr_reader.cpp.
 #include "image/exr.hpp"
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStdIO.h>
@@ -22,60 +21,9 @@ namespace ols {
 
 namespace {
 
-// The channel names of an image as this reader understands it: RGBA, RGB, or one channel.
-std::vector<std::string> readable_channels(const Imf::ChannelList& channels) {
-    if (channels.findChannel("R") && channels.findChannel("G") && channels.findChannel("B")) {
-        if (channels.findChannel("A")) return {"R", "G", "B", "A"};
-        return {"R", "G", "B"};
-    }
-    if (channels.findChannel("Y")) return {"Y"};
-    std::vector<std::string> names;
-    for (auto it = channels.begin(); it != channels.end(); ++it) names.push_back(it.name());
-    if (names.size() == 1) return names;
-    return {};
-}
-
-Imf::Slice float_slice(Image& image, int channel, const Imath::Box2i& window) {
-    const size_t x_stride = sizeof(float) * image.channels, y_stride = x_stride * image.width;
-    char* base = reinterpret_cast<char*>(image.data.data() + channel) - std::ptrdiff_t(window.min.x) * x_stride -
-                 std::ptrdiff_t(window.min.y) * y_stride;
-    return Imf::Slice(Imf::FLOAT, base, x_stride, y_stride);
-}
-
 ::half clamped_half(float v) {
     return ::half(std::isfinite(v) ? std::clamp(v, -float(HALF_MAX), float(HALF_MAX)) : v);
 }
-
-}  // namespace
-
-Result<Image> read_exr(const std::string& path) {
-    try {
-        Imf::InputFile file(path.c_str());
-        const Imath::Box2i window = file.header().dataWindow();
-        const auto names = readable_channels(file.header().channels());
-        if (names.empty())
-            return fail("'" + path + "' has neither R G B nor a single channel: export it as an RGB OpenEXR file");
-        Image image(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, int(names.size()));
-        Imf::FrameBuffer buffer;
-        for (size_t c = 0; c < names.size(); ++c) buffer.insert(names[c], float_slice(image, int(c), window));
-        file.setFrameBuffer(buffer);
-        file.readPixels(window.min.y, window.max.y);
-        return image;
-    } catch (const std::exception& e) {
-        return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
-    }
-}
-
-Result<bool> is_exr_cube_map(const std::string& path) {
-    try {
-        const Imf::InputFile file(path.c_str());
-        return Imf::hasEnvmap(file.header()) && Imf::envmap(file.header()) == Imf::ENVMAP_CUBE;
-    } catch (const std::exception& e) {
-        return fail("cannot read '" + path + "' as OpenEXR: " + e.what());
-    }
-}
-
-namespace {
 
 // The whole file. In memory, because the library's own file stream forgets errors of its last write.
 std::string encoded(const Image& image, ExrType type, const std::map<std::string, std::string>& attributes) {

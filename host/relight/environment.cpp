@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
-#include <opencv2/imgcodecs.hpp>
+#include <string_view>
 
-#include "image/exr.hpp"
+#include "image/input_file.hpp"
+#include "image/radiance.hpp"
 
 namespace ols {
 
@@ -51,23 +51,58 @@ double angular_solid_angle(const EnvPatch& patch) {
     return sum * half_u * half_v;
 }
 
-Result<Image> read_radiance_hdr(const std::string& path) {
-    if (!std::filesystem::exists(path)) return fail("cannot open environment map '" + path + "': check the path");
-    const cv::Mat bgr = cv::imread(path, cv::IMREAD_UNCHANGED);
-    if (bgr.empty() || bgr.type() != CV_32FC3)
-        return fail("cannot read '" + path +
-                    "' as an environment map: it is no Radiance (.hdr) or OpenEXR (.exr) file");
-    Image image(bgr.cols, bgr.rows, 3);
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x)
-            for (int c = 0; c < 3; ++c) image.at(x, y, c) = bgr.at<cv::Vec3f>(y, x)[2 - c];
-    return image;
+// By its first bytes, whatever its name says.
+Result<FloatPicture> read_map(const std::string& path, const ExrChoice& choice) {
+    auto stream = open_input(path);
+    if (!stream) return stream.error();
+    char bytes[16] = {};
+    stream->read(bytes, sizeof bytes);
+    const std::string_view start(bytes, size_t(stream->gcount()));
+    if (begins_as_exr(start)) return read_exr_picture(path, choice);
+    if (choice.part || choice.layer)
+        return fail("'" + path + "' is no OpenEXR file, so it has no parts or layers: leave out --part and --layer");
+    if (begins_as_radiance(start)) return read_radiance(path);
+    return fail("cannot read '" + path + "' as an environment map: it is " + kind_of_bytes(start) +
+                ", and only OpenEXR (.exr) and Radiance (.hdr) hold radiance as it is");
 }
 
-bool has_suffix(const std::string& path, const std::string& lower_case) {
-    if (path.size() < lower_case.size()) return false;
-    return std::equal(lower_case.begin(), lower_case.end(), path.end() - std::ptrdiff_t(lower_case.size()),
-                      [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+bool has_ratio(const Image& image, int width, int height) {
+    constexpr double tolerance = 0.01;  // panoramas are cut to whole pixels
+    return std::abs(double(image.width) * height / (double(image.height) * width) - 1) < tolerance;
+}
+
+bool is_cube_shaped(const Image& image) {
+    return has_ratio(image, 6, 1) || has_ratio(image, 1, 6) || has_ratio(image, 4, 3) || has_ratio(image, 3, 4);
+}
+
+constexpr const char* cube_remedy =
+    "turn it into a latitude-longitude map with `exrenvmap -latlong`, or say what it is with --env-convention";
+
+// The layout of a map of which nobody has said it: by its header, else latitude-longitude, and a warning if its shape is another.
+Result<EnvConvention> layout_of(const FloatPicture& map, std::vector<std::string>& warnings) {
+    const std::string size = std::to_string(map.pixels.width) + " x " + std::to_string(map.pixels.height);
+    if (map.layout == StatedLayout::cube) return fail(std::string("is a cube map: ") + cube_remedy);
+    if (!map.layout && is_cube_shaped(map.pixels))
+        return fail("is " + size + ", the shape of the unfolded faces of a cube: " + cube_remedy);
+    if (has_ratio(map.pixels, 1, 1) && !map.layout)
+        warnings.push_back(
+            "it is square (" + size +
+            "), as angular probes are (--env-convention angular; mirror balls are not read), but was taken as "
+            "latitude-longitude: say which with --env-convention");
+    else if (!has_ratio(map.pixels, 2, 1))
+        warnings.push_back(
+            "it is " + size +
+            " and was taken as latitude-longitude, which is twice as wide as high: check it, or say what it is with "
+            "--env-convention");
+    return EnvConvention::openexr;
+}
+
+// What the header says against what the user says, who knows better.
+void warn_of_other_layout(const FloatPicture& map, EnvConvention convention, std::vector<std::string>& warnings) {
+    if (map.layout == StatedLayout::cube)
+        warnings.push_back("its header says cube map, but it was taken as --env-convention says");
+    if (map.layout == StatedLayout::latitude_longitude && convention == EnvConvention::angular)
+        warnings.push_back("its header says latitude-longitude, but it was taken as an angular probe");
 }
 
 }  // namespace
@@ -115,25 +150,28 @@ Environment make_environment(const Image& pixels, EnvConvention convention) {
             environment.clamped_non_finite += non_finite;
         }
     }
+    const auto warn = [&](size_t texels, const char* what) {
+        if (texels > 0) environment.warnings.push_back(std::to_string(texels) + " texels had " + what + ", taken as 0");
+    };
+    warn(environment.clamped_negative, "negative values");
+    warn(environment.clamped_non_finite, "NaN or Inf");
     return environment;
 }
 
-Result<Environment> read_environment(const std::string& path, std::optional<EnvConvention> convention) {
-    const bool hdr = has_suffix(path, ".hdr") || has_suffix(path, ".pic");
-    if (!hdr && !convention) {
-        const auto cube = is_exr_cube_map(path);
-        if (!cube) return cube.error();
-        if (*cube)
-            return fail("'" + path +
-                        "' is a cube map: turn it into a latitude-longitude map with `exrenvmap -latlong`");
-    }
-    const auto pixels = hdr ? read_radiance_hdr(path) : read_exr(path);
-    if (!pixels) return pixels.error();
-    const auto layout = convention.value_or(EnvConvention::openexr);
-    if (layout == EnvConvention::angular && pixels->width != pixels->height)
+Result<Environment> read_environment(const std::string& path, std::optional<EnvConvention> convention,
+                                     const ExrChoice& choice) {
+    auto map = read_map(path, choice);
+    if (!map) return map.error();
+    std::vector<std::string> warnings = std::move(map->said);
+    if (convention) warn_of_other_layout(*map, *convention, warnings);
+    const auto layout = convention ? Result(*convention) : layout_of(*map, warnings);
+    if (!layout) return fail("'" + path + "' " + layout.error().message);
+    if (*layout == EnvConvention::angular && map->pixels.width != map->pixels.height)
         return fail("'" + path +
                     "' is not square, so it is no angular probe: use --env-convention openexr or mirrored");
-    return make_environment(*pixels, layout);
+    Environment environment = make_environment(map->pixels, *layout);
+    environment.warnings.insert(environment.warnings.begin(), warnings.begin(), warnings.end());
+    return environment;
 }
 
 }  // namespace ols

@@ -4,8 +4,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "image/frame.hpp"
+#include "image/exr.hpp"
 #include "result.hpp"
 #include "stage/lamps.hpp"
 
@@ -42,16 +43,19 @@ double env_reach(EnvConvention convention, const EnvPatch& patch);
 struct Environment {
     Image radiance;  // 3 channels, finite, not negative
     EnvConvention convention = EnvConvention::openexr;
-    size_t clamped_negative = 0;    // texels that had a negative channel, now 0 there
-    size_t clamped_non_finite = 0;  // texels that had NaN or Inf, now 0 there
+    size_t clamped_negative = 0;             // texels that had a negative channel, now 0 there
+    size_t clamped_non_finite = 0;           // texels that had NaN or Inf, now 0 there
+    std::vector<std::string> warnings = {};  // what the user should know of these and of the file: a phrase each
 };
 
 // Takes 1, 3 or 4 channels (alpha is ignored), clamps what is negative or not finite to 0 and counts such texels.
 Environment make_environment(const Image& pixels, EnvConvention convention);
 
-// Reads an OpenEXR (.exr) or Radiance (.hdr) map. Without a convention the file's `envmap` attribute decides, and a
-// file without one is taken as OpenEXR's latitude-longitude. Errors name the file: not readable, a cube map, an angular
-// probe that is not square.
-Result<Environment> read_environment(const std::string& path, std::optional<EnvConvention> convention = std::nullopt);
+// Reads an OpenEXR (.exr) or Radiance (.hdr) map, told apart by their first bytes. Without a convention the file's `envmap`
+// attribute decides, and a file without one is taken as OpenEXR's latitude-longitude, with a warning if it is not twice as wide as
+// high. Errors name the file: not readable, another kind of file, a cube map or of such a shape, an angular probe that is not
+// square.
+Result<Environment> read_environment(const std::string& path, std::optional<EnvConvention> convention = std::nullopt,
+                                     const ExrChoice& choice = {});
 
 }  // namespace ols

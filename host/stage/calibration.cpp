@@ -23,13 +23,16 @@ std::string camera_folder(const std::string& folder, size_t camera) {
 }
 
 Result<Image> read_plane(const std::string& path, const CameraConfig& camera, float smallest) {
-    auto image = read_exr(path);
-    if (!image.ok()) return fail(image.error().message + "; " + remedy);
+    auto picture = read_exr_picture(path);
+    if (!picture.ok()) return fail(picture.error().message + "; " + remedy);
+    if (!picture->said.empty())
+        return fail(fmt::format("'{}' is not as stagectl wrote it ({}): {}", path, picture->said.front(), remedy));
+    Image image = std::move(picture->pixels);
     const int channels = samples_per_pixel(camera.cfa);
-    if (image->width != camera.width || image->height != camera.height || image->channels != channels)
-        return fail(fmt::format("'{}' has {} x {} x {} samples and the camera {} x {} x {}: {}", path, image->width,
-                                image->height, image->channels, camera.width, camera.height, channels, remedy));
-    for (const float value : image->data)
+    if (image.width != camera.width || image.height != camera.height || image.channels != channels)
+        return fail(fmt::format("'{}' has {} x {} x {} samples and the camera {} x {} x {}: {}", path, image.width,
+                                image.height, image.channels, camera.width, camera.height, channels, remedy));
+    for (const float value : image.data)
         if (!std::isfinite(value) || value < smallest)
             return fail(fmt::format("'{}' holds the value {}: {}", path, value, remedy));
     return image;

@@ -27,10 +27,17 @@ nlohmann::json finite_or_null(double value) {
     return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
+Result<Image> read_and_warn(const std::string& path) {
+    auto picture = read_exr_picture(path);
+    if (!picture) return picture.error();
+    for (const auto& warning : picture->said) fmt::print(stderr, "rf compare: {}: {}\n", path, warning);
+    return std::move(picture->pixels);
+}
+
 Status run(const Options& options) {
-    const auto image = read_exr(options.image);
+    const auto image = read_and_warn(options.image);
     if (!image) return image.error();
-    const auto reference = read_exr(options.reference);
+    const auto reference = read_and_warn(options.reference);
     if (!reference) return reference.error();
     if (image->width != reference->width || image->height != reference->height ||
         std::min(image->channels, 3) != std::min(reference->channels, 3))

@@ -35,7 +35,7 @@ Status add_environment(const LightingOptions& options, const SphereCells& cells,
         if (!parsed) return parsed.error();
         convention = *parsed;
     }
-    const auto environment = read_environment(options.environment, convention);
+    const auto environment = read_environment(options.environment, convention, options.picture);
     if (!environment) return environment.error();
     lighting.weights = integrate_environment(
         *environment, cells, {.rotate_rad = options.rotate_deg * degree, .exposure_ev = options.exposure_ev});
@@ -44,13 +44,10 @@ Status add_environment(const LightingOptions& options, const SphereCells& cells,
                                       {"height", environment->radiance.height},
                                       {"rotate_deg", options.rotate_deg},
                                       {"clamped_negative_texels", environment->clamped_negative},
-                                      {"clamped_non_finite_texels", environment->clamped_non_finite}};
-    if (environment->clamped_negative > 0)
-        lighting.warnings.push_back(fmt::format("{}: {} texels had negative values, taken as 0", options.environment,
-                                                environment->clamped_negative));
-    if (environment->clamped_non_finite > 0)
-        lighting.warnings.push_back(fmt::format("{}: {} texels had NaN or Inf, taken as 0", options.environment,
-                                                environment->clamped_non_finite));
+                                      {"clamped_non_finite_texels", environment->clamped_non_finite},
+                                      {"warnings", environment->warnings}};
+    for (const auto& warning : environment->warnings)
+        lighting.warnings.push_back(fmt::format("{}: {}", options.environment, warning));
     return Done{};
 }
 
@@ -61,6 +58,9 @@ void LightingOptions::add_to(CLI::App& verb) {
     verb.add_option("--env-convention", convention,
                     "openexr: latitude-longitude, +Z in the middle, +X left of it (default); mirrored: +X right of it; "
                     "angular: angular probe, -Z in the middle")
+        ->type_name("NAME");
+    verb.add_option("--part", picture.part, "part of a map of several, by name or number")->type_name("NAME");
+    verb.add_option("--layer", picture.layer, "layer of a map of several: \"beauty\" for beauty.R ...")
         ->type_name("NAME");
     verb.add_option("--rotate", rotate_deg, "turn the map about +Y; 90 moves light from the camera (+Z) to +X")
         ->type_name("DEG")

@@ -15,6 +15,7 @@ namespace ols {
 struct LightingOptions {
     std::string environment;  // path; empty for none
     std::string convention;   // empty: as the file says
+    ExrChoice picture;        // which of an OpenEXR file's pictures is the map
     double rotate_deg = 0;
     double exposure_ev = 0;
     std::vector<std::string> lights;  // "x y z r g b"

@@ -27,6 +27,7 @@ struct RenderOptions {
     std::vector<int> lamps;
     bool all_lamps = false, olat = false, json = false;
     std::string weights, env, env_convention, unit = "reflectance", out, png;
+    ExrChoice env_picture;
     double rotate_deg = 0, exposure_ev = 0, time_us = 0, png_gain = 1;
 };
 
@@ -57,8 +58,10 @@ Result<std::vector<Float3>> environment_weights(const RenderOptions& options, co
         if (!parsed) return parsed.error();
         convention = *parsed;
     }
-    const auto environment = read_environment(options.env, convention);
+    const auto environment = read_environment(options.env, convention, options.env_picture);
     if (!environment) return environment.error();
+    for (const auto& warning : environment->warnings)
+        fmt::print(stderr, "stagesim render: {}: {}\n", options.env, warning);
     std::vector<Vec3> directions;
     for (const LightPosition& lamp : stage.lamps) directions.push_back(lamp.direction);
     const auto cells = SphereCells::make(directions);
@@ -184,6 +187,8 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     auto* olat = light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
     light->require_option(1);
     verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
+    verb->add_option("--part", options->env_picture.part, "part of an environment map of several, by name or number");
+    verb->add_option("--layer", options->env_picture.layer, "layer of an environment map of several");
     verb->add_option("--rotate", options->rotate_deg,
                      "turn the environment about +Y, degrees: light from +Z moves to +X");
     verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
