@@ -3,8 +3,9 @@
 #include "image/input_file.hpp"
 
 #include <filesystem>
-#include <iterator>
 #include <utility>
+
+#include <algorithm>
 
 namespace ols {
 
@@ -58,8 +59,11 @@ std::string kind_of_bytes(std::string_view bytes) {
 Result<std::string> read_input(const std::string& path) {
     auto stream = open_input(path);
     if (!stream) return stream.error();
-    std::string bytes{std::istreambuf_iterator<char>(*stream), {}};
-    if (stream->bad()) return fail("cannot read '" + path + "': check the disk");
+    stream->seekg(0, std::ios::end);
+    std::string bytes(size_t(std::max<std::streamoff>(stream->tellg(), 0)), '\0');
+    stream->seekg(0);
+    stream->read(bytes.data(), std::streamsize(bytes.size()));
+    if (!*stream) return fail("cannot read '" + path + "': check the disk");
     return bytes;
 }
 

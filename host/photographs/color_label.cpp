@@ -11,9 +11,6 @@
 
 namespace ols {
 
-const Primaries rec709_primaries = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}};
-const Primaries adobe_primaries = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
-
 std::vector<uint16_t> srgb_curve() {
     std::vector<uint16_t> curve(4096);
     for (size_t i = 0; i < curve.size(); ++i) curve[i] = uint16_t(std::lround(65535 * srgb_decode(float(i) / 4095)));
@@ -29,21 +26,8 @@ Profile owned(cmsHPROFILE profile) {
     return Profile(profile, [](cmsHPROFILE p) { return p ? cmsCloseProfile(p) : TRUE; });
 }
 
-cmsCIExyY xyY(const std::array<double, 2>& xy) {
-    return {xy[0], xy[1], 1};
-}
-
-// Twice the signed area of the triangle of primaries; the white has to lie inside.
-Status check(const Primaries& p) {
-    const auto side = [](const auto& a, const auto& b, const auto& c) {
-        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    };
-    const double area = side(p.red, p.green, p.blue);
-    const bool inside = std::abs(area) > 1e-4 && side(p.red, p.green, p.white) / area > 1e-3 &&
-                        side(p.green, p.blue, p.white) / area > 1e-3 && side(p.blue, p.red, p.white) / area > 1e-3;
-    const bool all_finite = std::isfinite(area) && p.white[1] > 1e-3;
-    if (!inside || !all_finite) return fail("its primaries span no triangle around its white");
-    return Done{};
+cmsCIExyY xyY(const Chromaticity& xy) {
+    return {xy.x, xy.y, 1};
 }
 
 Profile rgb_profile(const Primaries& p, const std::array<cmsToneCurve*, 3>& curves) {
@@ -92,7 +76,7 @@ bool agrees_with_srgb(const ColorConversion& conversion, int channels) {
 Result<ColorConversion> ColorConversion::create(const ColorLabel& label, int channels) {
     cmsSetLogErrorHandler([](cmsContext, cmsUInt32Number, const char*) {});  // what fails is told below
     if (label.primaries && label.profile.empty())
-        if (auto s = check(*label.primaries); !s) return s.error();
+        if (const auto weights = luminance_weights(*label.primaries); !weights) return weights.error();
     if (label.gamma != 0 && !(label.gamma >= 0.1 && label.gamma <= 10))
         return fail(fmt::format("its gamma of {:g} is out of range (0.1 to 10)", label.gamma));
     const Profile from =

@@ -10,14 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "image/primaries.hpp"
 #include "result.hpp"
 
 namespace ols {
-
-// Chromaticities x, y (CIE 1931).
-struct Primaries {
-    std::array<double, 2> red, green, blue, white;
-};
 
 struct ColorLabel {
     std::string name;              // for messages: "the profile 'Adobe RGB (1998)'"; empty: the file says nothing
@@ -29,9 +25,8 @@ struct ColorLabel {
     bool is_srgb = false;  // said in so many words
 };
 
-// Rec. 709, which are sRGB's; Adobe RGB (1998), section 4.3.1.
-extern const Primaries rec709_primaries;
-extern const Primaries adobe_primaries;
+// Adobe RGB (1998), section 4.3.1.
+inline constexpr Primaries adobe_primaries = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
 
 // sRGB as a table of 4096 entries, light 0..65535 by code.
 std::vector<uint16_t> srgb_curve();

@@ -41,6 +41,23 @@ struct Pictures {
     }
 };
 
+// A channel of an image, over how bright its light was.
+void divide_channel(const Image& image, int channel, double intensity, std::vector<float>& plane) {
+    const float* sample = image.data.data() + channel;
+    const float divisor = float(intensity);
+    for (float& value : plane) {
+        value = *sample / divisor;
+        sample += image.channels;
+    }
+}
+
+// The same for a mosaic, whose pixels see different colours of the light.
+void divide_mosaic(const Image& image, Cfa cfa, const Intensity& intensity, std::vector<float>& plane) {
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            plane[size_t(y) * image.width + x] = image.at(x, y) / float(intensity[cfa_color(cfa, x, y)]);
+}
+
 Status put_aside(Pictures& pictures, int index, const Picture& picture, const Intensity& intensity,
                  const std::string& path, const std::string& first) {
     const Image& image = picture.light;
@@ -50,14 +67,10 @@ Status put_aside(Pictures& pictures, int index, const Picture& picture, const In
     pictures.in_color[index] = image.channels == 3;
     std::vector<float> plane(size_t(image.width) * image.height);
     for (int c = 0; c < image.channels; ++c) {
-        const bool is_grey = image.channels == 1;
-        for (size_t p = 0; p < plane.size(); ++p) {
-            const int color = !is_grey ? c
-                              : is_mosaic(picture.cfa)
-                                  ? cfa_color(picture.cfa, int(p % image.width), int(p / image.width))
-                                  : 1;
-            plane[p] = float(image.data[p * image.channels + c] / intensity[color]);
-        }
+        if (is_mosaic(picture.cfa))
+            divide_mosaic(image, picture.cfa, intensity, plane);
+        else
+            divide_channel(image, c, image.channels == 1 ? intensity[1] : intensity[c], plane);
         if (auto s = pictures.spool->write(index * 3 + c, plane); !s) return s;
     }
     return Done{};

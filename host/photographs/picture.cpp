@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "image/exr.hpp"
+#include "image/radiance.hpp"
 #include "image/tone.hpp"
 #include "photographs/orientation.hpp"
 
@@ -30,7 +31,11 @@ Image colors_of(const PictureSamples& samples, double scale, const ToLight& to_l
             constexpr bool has_table = !std::is_same_v<Code, float>;
             if constexpr (has_table) {
                 table.resize(size_t(last_of<Code>) + 1);
-                for (size_t i = 0; i < table.size(); ++i) table[i] = to_light(float(double(i) / last_of<Code> * scale));
+                // OpenImageIO stretches codes of fewer bits to 8 or 16: back to the code itself, which is exact.
+                for (size_t i = 0; i < table.size(); ++i) {
+                    const double code = std::round(double(i) / last_of<Code> * samples.last_code);
+                    table[i] = to_light(float(code / samples.last_code * scale));
+                }
             }
             const size_t pixels = size_t(samples.width) * samples.height;
             for (size_t p = 0; p < pixels; ++p)
@@ -63,8 +68,8 @@ double largest_code(const PictureSamples& samples) {
         [&]<typename Code>(const std::vector<Code>& codes) -> double {
             if constexpr (std::is_same_v<Code, float>) return 0;
             Code largest = 0;
-            for (size_t i = 0; i < codes.size(); ++i)
-                if (int(i % samples.channels) < samples.colors) largest = std::max(largest, codes[i]);
+            for (auto pixel = codes.begin(); pixel != codes.end(); pixel += samples.channels)
+                for (int c = 0; c < samples.colors; ++c) largest = std::max(largest, pixel[c]);
             return std::round(double(largest) / last_of<Code> * samples.last_code);
         },
         samples.codes);
@@ -169,13 +174,18 @@ std::optional<Image> take_alpha(Image& image) {
     return alpha;
 }
 
-Result<Picture> read_openexr(const std::string& path, const PictureOptions& options) {
-    auto image = read_exr(path);
-    if (!image) return image.error();
+// OpenEXR and Radiance.
+Result<Picture> read_floats(const std::string& path, PictureFormat format, const PictureOptions& options) {
+    auto read = format == PictureFormat::openexr ? read_exr_picture(path) : read_radiance(path);
+    if (!read) return read.error();
     Picture picture;
-    picture.alpha = take_alpha(*image);
-    picture.light = std::move(*image);
+    picture.said = std::move(read->said);
+    picture.alpha = take_alpha(read->pixels);
+    if (picture.alpha)
+        picture.said.push_back("alpha is left out; the colours are multiplied by it as the file has them");
+    picture.light = std::move(read->pixels);
     picture.cfa = picture.light.channels == 3 ? Cfa::rgb : Cfa::none;
+    picture.is_rec709 = read->is_rec709 && options.transfer != Transfer::srgb;
     const float scale = options.full_scale > 0 ? float(1 / options.full_scale) : 1;
     const bool srgb = options.transfer == Transfer::srgb;
     if (srgb || scale != 1)
@@ -189,7 +199,8 @@ Result<Picture> read_any(const std::string& path, const PictureOptions& options)
     if (options.page > 1 && *format != PictureFormat::tiff && *format != PictureFormat::heif)
         return fail(fmt::format("'{}' has one page: leave out --page {}", path, options.page));
     if (*format == PictureFormat::raw) return read_camera_raw(path, options);
-    if (*format == PictureFormat::openexr) return read_openexr(path, options);
+    if (*format == PictureFormat::openexr || *format == PictureFormat::radiance)
+        return read_floats(path, *format, options);
     return read_coded(path, *format, options);
 }
 

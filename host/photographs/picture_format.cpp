@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <string_view>
 
+#include "image/input_file.hpp"
 #include "photographs/raw_picture.hpp"
 
 namespace ols {
@@ -80,16 +80,11 @@ std::string lower_extension(const std::string& path) {
 }
 
 Result<std::string> first_bytes(const std::string& path) {
-    std::error_code error;
-    const auto type = std::filesystem::status(path, error).type();
-    if (type == std::filesystem::file_type::not_found) return fail("'" + path + "' is not there: check the path");
-    if (type != std::filesystem::file_type::regular)
-        return fail("'" + path + "' is no file but a folder, a pipe or a device: give a picture");
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) return fail("cannot open '" + path + "': check its permissions");
+    auto stream = open_input(path);
+    if (!stream) return stream.error();
     std::string head(32, '\0');
-    stream.read(head.data(), std::streamsize(head.size()));
-    head.resize(size_t(stream.gcount()));
+    stream->read(head.data(), std::streamsize(head.size()));
+    head.resize(size_t(stream->gcount()));
     if (head.empty()) return fail("'" + path + "' is empty: copy it again");
     return head;
 }

@@ -3,12 +3,14 @@
 #include "photographs/picture_samples.hpp"
 
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/tiffutils.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 
 namespace ols {
@@ -106,13 +108,14 @@ double attribute(const ImageSpec& spec, const char* name) {
 }
 
 void take_label(const ImageSpec& spec, PictureSamples& samples) {
+    if (!samples.label.name.empty()) return;  // by a reader of our own
     if (const auto* profile = spec.find_attribute("ICCProfile")) {
         const auto* bytes = static_cast<const uint8_t*>(profile->data());
         samples.label = {};
         samples.label.profile.assign(bytes, bytes + profile->datasize());
         const std::string name = spec.get_string_attribute("ICCProfile:profile_description");
         samples.label.name = name.empty() ? "its profile" : "its profile '" + one_line(name) + "'";
-    } else if (samples.label.name.empty() && spec.get_int_attribute("Exif:ColorSpace", 1) == 0xffff) {
+    } else if (spec.get_int_attribute("Exif:ColorSpace", 1) == 0xffff) {
         // DCF 2.0: R03 is Adobe RGB; without it nobody knows.
         samples.label.name = "its Exif colour space";
         if (spec.get_string_attribute("Exif:InteroperabilityIndex") == "R03") {
@@ -148,7 +151,9 @@ Status read_any_codes(OpenPicture& picture, const std::string& path, PictureSamp
     const auto type = picture.spec.format.basetype;
     samples.is_integer = type != TypeDesc::HALF && type != TypeDesc::FLOAT && type != TypeDesc::DOUBLE;
     if (samples.is_integer) {
-        const int bits = picture.spec.get_int_attribute("oiio:BitsPerSample", int(picture.spec.format.size() * 8));
+        // A float in one of OpenImageIO's readers, an int in the others.
+        const int stated = int(attribute(picture.spec, "oiio:BitsPerSample"));
+        const int bits = stated > 0 ? stated : int(picture.spec.format.size() * 8);
         const bool has_sign = type == TypeDesc::INT8 || type == TypeDesc::INT16 || type == TypeDesc::INT32;
         samples.last_code = std::exp2(std::clamp(bits, 1, 32) - (has_sign ? 1 : 0)) - 1;
     }
@@ -157,12 +162,28 @@ Status read_any_codes(OpenPicture& picture, const std::string& path, PictureSamp
     return read_codes<float>(*picture.input, path, TypeDesc::FLOAT, samples);
 }
 
+// Of 1 bit a pixel.
+Status read_two_codes(const std::string& path, int page, PictureSamples& samples) {
+    auto bits = read_bilevel(path, page);
+    if (!bits) return bits.error();
+    for (auto& bit : *bits) bit *= 255;
+    samples.codes = std::move(*bits);
+    samples.last_code = 1;
+    return Done{};
+}
+
 // White is zero (TIFF 6.0 section 8): OpenImageIO turns samples of 8 bits only.
 void invert(PictureSamples& samples) {
+    if (auto* codes = std::get_if<std::vector<uint8_t>>(&samples.codes))
+        for (auto& code : *codes) code = uint8_t(255 - code);
     if (auto* codes = std::get_if<std::vector<uint16_t>>(&samples.codes))
         for (auto& code : *codes) code = uint16_t(65535 - code);
     if (auto* codes = std::get_if<std::vector<float>>(&samples.codes))
         for (auto& code : *codes) code = 1 - code;
+}
+
+bool openimageio_inverts(const TiffPage& page) {
+    return page.bits > 1 && page.bits <= 8;
 }
 
 Status check_photometric(const TiffPage& page, const std::string& path) {
@@ -194,6 +215,14 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
         if (!label) return label.error();
         samples.label = std::move(*label);
     }
+    std::vector<uint8_t> exif;
+    if (format == PictureFormat::heif || format == PictureFormat::webp) {
+        auto container = format == PictureFormat::heif ? read_heif_label(path) : read_webp_label(path);
+        if (!container) return container.error();
+        samples.label = std::move(container->label);
+        samples.said = std::move(container->said);
+        exif = std::move(container->exif);
+    }
     if (format == PictureFormat::tiff) {
         auto pages = read_tiff_pages(path);
         if (!pages) return pages.error();
@@ -203,7 +232,8 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
     if (!picture) return picture.error();
     const int pages = tiff_pages.empty() ? count_pages(path, format) : int(tiff_pages.size());
     if (auto s = choose_page(*picture, path, pages, page); !s) return s.error();
-    const ImageSpec& spec = picture->spec;
+    ImageSpec& spec = picture->spec;
+    if (!exif.empty()) OIIO::decode_exif(OIIO::cspan<uint8_t>(exif.data(), exif.size()), spec);
     if (auto s = check_size(path, format, spec.width, spec.height, double(spec.pixel_bytes(true))); !s)
         return s.error();
     const size_t index = size_t(std::max(page, 1) - 1);
@@ -211,6 +241,7 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
         if (auto s = check_photometric(tiff_pages[index], path); !s) return s.error();
         if (auto s = check_tiff_page(path, int(index)); !s) return s.error();
         samples.label = tiff_pages[index].label;
+        if (spec.find_attribute("ICCProfile")) samples.label = {};
     }
     samples.width = spec.width;
     samples.height = spec.height;
@@ -220,8 +251,11 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
     if (samples.orientation < 1 || samples.orientation > 8)
         return fail(fmt::format("'{}' says its orientation is {}: the tag has 1 to 8; remove or correct it", path,
                                 samples.orientation));
-    if (auto s = read_any_codes(*picture, path, samples); !s) return s.error();
-    if (index < tiff_pages.size() && tiff_pages[index].photometric == 0) invert(samples);
+    const bool is_bilevel = index < tiff_pages.size() && tiff_pages[index].bits == 1 && tiff_pages[index].samples == 1;
+    if (auto s = is_bilevel ? read_two_codes(path, int(index), samples) : read_any_codes(*picture, path, samples); !s)
+        return s.error();
+    if (index < tiff_pages.size() && tiff_pages[index].photometric == 0 && !openimageio_inverts(tiff_pages[index]))
+        invert(samples);
     return samples;
 }
 

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <fstream>
-#include <iterator>
 #include <string_view>
 
+#include "image/input_file.hpp"
+#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 
 namespace ols {
@@ -20,36 +20,41 @@ uint32_t word(std::string_view bytes, size_t at) {
 }
 
 Status take_cicp(std::string_view data, ColorLabel& label) {
-    // ITU-T H.273: primaries 1 are Rec. 709's; transfer 8 is linear, 13 sRGB's, 16 and 18 are PQ and HLG.
-    const int primaries = (unsigned char)data[0], transfer = (unsigned char)data[1], matrix = (unsigned char)data[2];
-    if (matrix != 0 || (transfer != 8 && transfer != 13) || data[3] != 1)
-        return fail(fmt::format("is coded for a display or as video (cICP {} {} {} {})", primaries, transfer, matrix,
-                                int(data[3])));
-    label = {};
-    label.name = "its cICP chunk";
-    label.is_srgb = transfer == 13 && primaries == 1;
-    if (label.is_srgb) return Done{};
-    static const Primaries bt2020 = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
-    static const Primaries p3 = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
-    if (primaries != 1 && primaries != 9 && primaries != 12)
-        return fail(fmt::format("has primaries of an unusual kind (cICP {})", primaries));
-    label.primaries = primaries == 9 ? bt2020 : primaries == 12 ? p3 : rec709_primaries;
-    if (transfer == 8) {
-        label.gamma = 1;
-    } else {
-        label.curves = {};
-        for (auto& curve : label.curves) curve = srgb_curve();
-    }
+    const int primaries = (unsigned char)data[0], transfer = (unsigned char)data[1];
+    if (data[2] != 0 || data[3] != 1) return fail("is coded as video (cICP)");
+    auto codes = label_of_codes(primaries, transfer, "its cICP chunk");
+    if (!codes) return codes.error();
+    label = std::move(*codes);
     return Done{};
 }
 
-// Whose word counts: cICP, iCCP (not here), sRGB, then gAMA and cHRM (table of 4.3).
+// A name, a zero, a zero for deflate, a deflated ICC profile. libpng drops one that it does not like.
+Status take_iccp(std::string_view data, ColorLabel& label) {
+    constexpr size_t largest = 16 << 20;
+    const size_t name = data.find('\0');
+    if (name == std::string_view::npos || data.size() < name + 3 || data[name + 1] != 0)
+        return fail("has a damaged profile (iCCP)");
+    const std::string_view deflated = data.substr(name + 2);
+    label = {};
+    label.profile.resize(std::min(largest, deflated.size() * 1100 + 128));
+    uLongf size = label.profile.size();
+    if (uncompress(label.profile.data(), &size, reinterpret_cast<const Bytef*>(deflated.data()), deflated.size()) !=
+        Z_OK)
+        return fail("has a damaged profile (iCCP)");
+    label.profile.resize(size);
+    label.name = fmt::format("its profile '{}'", data.substr(0, name));
+    return Done{};
+}
+
+// Whose word counts: cICP, iCCP, sRGB, then gAMA and cHRM (table of 4.3).
 Status take_chunk(std::string_view type, std::string_view data, ColorLabel& label, bool& has_cicp) {
     if (type == "cICP" && data.size() == 4) {
         has_cicp = true;
         return take_cicp(data, label);
     }
     if (has_cicp) return Done{};
+    if (type == "iCCP") return take_iccp(data, label);
+    if (!label.profile.empty()) return Done{};
     if (type == "sRGB" && data.size() == 1) {
         label = {};
         label.name = "its sRGB chunk";
@@ -63,7 +68,7 @@ Status take_chunk(std::string_view type, std::string_view data, ColorLabel& labe
         label.name = fmt::format("its gamma of 1/{:.4g}", label.gamma);
     }
     if (type == "cHRM" && data.size() == 32) {
-        const auto xy = [&](size_t i) { return std::array{word(data, 8 * i) / 1e5, word(data, 8 * i + 4) / 1e5}; };
+        const auto xy = [&](size_t i) { return Chromaticity{word(data, 8 * i) / 1e5, word(data, 8 * i + 4) / 1e5}; };
         label.primaries = Primaries{xy(1), xy(2), xy(3), xy(0)};
     }
     return Done{};
@@ -72,9 +77,9 @@ Status take_chunk(std::string_view type, std::string_view data, ColorLabel& labe
 }  // namespace
 
 Result<ColorLabel> read_png_label(const std::string& path) {
-    std::ifstream stream(path, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-    const std::string_view file = bytes;
+    const auto bytes = read_input(path);
+    if (!bytes) return bytes.error();
+    const std::string_view file = *bytes;
     const auto damaged = [&](const std::string& why) {
         return fail("'" + path + "' is damaged (" + why + "): copy it again");
     };

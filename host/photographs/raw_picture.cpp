@@ -11,6 +11,8 @@
 #include <memory>
 #include <optional>
 
+#include "photographs/file_damage.hpp"
+
 namespace ols {
 
 namespace {
@@ -27,13 +29,13 @@ int orientation_of(int flip) {
     return flip >= 0 && flip < 8 ? orientations[flip] : 1;
 }
 
-Crop crop_of(const libraw_data_t& data) {
+// Within the active area, as DNG's tags say; LibRaw 0.20 leaves them out.
+Crop crop_of(const libraw_data_t& data, const std::string& path) {
     const Crop whole{0, 0, data.sizes.width, data.sizes.height};
-    if (data.idata.dng_version == 0) return whole;
-    const unsigned* crop = data.color.dng_levels.default_crop;
-    const bool fits = crop[2] > 0 && crop[3] > 0 && uint64_t(crop[0]) + crop[2] <= uint64_t(whole.width) &&
-                      uint64_t(crop[1]) + crop[3] <= uint64_t(whole.height);
-    return fits ? Crop{int(crop[0]), int(crop[1]), int(crop[2]), int(crop[3])} : whole;
+    const auto crop = data.idata.dng_version == 0 ? std::nullopt : dng_default_crop(path);
+    const bool fits = crop && crop->x >= 0 && crop->y >= 0 && crop->width >= 1 && crop->height >= 1 &&
+                      crop->x + crop->width <= whole.width && crop->y + crop->height <= whole.height;
+    return fits ? Crop{int(crop->x), int(crop->y), int(crop->width), int(crop->height)} : whole;
 }
 
 // The filter pattern from (x, y) on; none if it is not one of Bayer's four.
@@ -65,7 +67,7 @@ double black_at(LibRaw& raw, int x, int y) {
 
 Result<RawPicture> read_mosaic(LibRaw& raw, const std::string& path) {
     const auto& data = raw.imgdata;
-    const Crop crop = crop_of(data);
+    const Crop crop = crop_of(data, path);
     const auto cfa = bayer_at(raw, crop.x, crop.y);
     if (!cfa || !data.rawdata.raw_image)
         return fail("'" + path + "' holds no Bayer mosaic of integers: ask for --raw rgb");
@@ -92,11 +94,9 @@ Result<RawPicture> read_mosaic(LibRaw& raw, const std::string& path) {
 
 using Processed = std::unique_ptr<libraw_processed_image_t, decltype(&LibRaw::dcraw_clear_mem)>;
 
+// LibRaw's matrix from the camera's colours to sRGB's primaries is diagonal as long as it knows nothing.
 bool has_camera_matrix(const libraw_data_t& data) {
-    for (const auto& row : data.color.cam_xyz)
-        for (const float v : row)
-            if (v != 0) return true;
-    return false;
+    return data.color.rgb_cam[0][1] != 0 || data.color.rgb_cam[1][0] != 0;
 }
 
 Result<RawPicture> read_rgb(LibRaw& raw, const std::string& path) {
@@ -115,7 +115,7 @@ Result<RawPicture> read_rgb(LibRaw& raw, const std::string& path) {
     const Processed image(raw.dcraw_make_mem_image(&error), LibRaw::dcraw_clear_mem);
     if (!image || image->type != LIBRAW_IMAGE_BITMAP || image->bits != 16 || (image->colors != 3 && image->colors != 1))
         return fail("cannot read '" + path + "' as raw: LibRaw makes no picture of it");
-    Crop crop = crop_of(raw.imgdata);
+    Crop crop = crop_of(raw.imgdata, path);
     if (crop.x + crop.width > image->width || crop.y + crop.height > image->height)
         crop = {0, 0, image->width, image->height};
     RawPicture picture;

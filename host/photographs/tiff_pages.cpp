@@ -3,8 +3,10 @@
 // checksum is wrong.
 #include <fmt/format.h>
 #include <tiffio.h>
+#include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdarg>
 #include <cstdio>
 #include <memory>
@@ -57,7 +59,7 @@ ColorLabel label_of(TIFF* file) {
     }
     float *primaries = nullptr, *white = nullptr;
     if (TIFFGetField(file, TIFFTAG_PRIMARYCHROMATICITIES, &primaries)) {
-        const auto xy = [](const float* v) { return std::array{double(v[0]), double(v[1])}; };
+        const auto xy = [](const float* v) { return Chromaticity{double(v[0]), double(v[1])}; };
         const bool has_white = TIFFGetField(file, TIFFTAG_WHITEPOINT, &white);
         label.primaries = Primaries{xy(primaries), xy(primaries + 2), xy(primaries + 4),
                                     has_white ? xy(white) : rec709_primaries.white};
@@ -74,6 +76,11 @@ TiffPage page_of(TIFF* file) {
     TIFFGetField(file, TIFFTAG_IMAGEWIDTH, &width);
     TIFFGetField(file, TIFFTAG_IMAGELENGTH, &height);
     page.photometric = photometric;
+    uint16_t bits = 1, samples = 1;
+    TIFFGetFieldDefaulted(file, TIFFTAG_BITSPERSAMPLE, &bits);
+    TIFFGetFieldDefaulted(file, TIFFTAG_SAMPLESPERPIXEL, &samples);
+    page.bits = bits;
+    page.samples = samples;
     page.width = int(width);
     page.height = int(height);
     page.label = label_of(file);
@@ -104,6 +111,36 @@ Status check_sub_directories(TIFF* file, const std::vector<TiffPage>& pages,
                                 "knows: convert it to DNG or plain TIFF",
                                 path, pages[i].width, pages[i].height, sub.width, sub.height));
         }
+    return Done{};
+}
+
+// Whether a deflated block has its end and its checksum (RFC 1950). libtiff stops when it has the samples, before either.
+bool is_whole_deflate(const std::vector<uint8_t>& block) {
+    z_stream stream{};
+    if (inflateInit(&stream) != Z_OK) return false;
+    std::array<Bytef, 1 << 16> sink;
+    stream.next_in = const_cast<Bytef*>(block.data());
+    stream.avail_in = uInt(block.size());
+    int state = Z_OK;
+    while (state == Z_OK) {
+        stream.next_out = sink.data();
+        stream.avail_out = uInt(sink.size());
+        state = inflate(&stream, Z_NO_FLUSH);
+    }
+    inflateEnd(&stream);
+    return state == Z_STREAM_END;
+}
+
+Status check_deflate(TIFF* file, uint32_t blocks, const std::string& path) {
+    for (uint32_t i = 0; i < blocks; ++i) {
+        const bool tiled = TIFFIsTiled(file);
+        std::vector<uint8_t> block(TIFFGetStrileByteCount(file, i));
+        const auto size = tmsize_t(block.size());
+        const auto read =
+            tiled ? TIFFReadRawTile(file, i, block.data(), size) : TIFFReadRawStrip(file, i, block.data(), size);
+        if (read != size || !is_whole_deflate(block))
+            return fail("'" + path + "' is damaged (a checksum is wrong): copy it again");
+    }
     return Done{};
 }
 
@@ -139,7 +176,41 @@ Status check_tiff_page(const std::string& path, int page) {
                                 : TIFFReadEncodedStrip(file.get(), i, block.data(), size);
         if (read < 0 || complaints.count > 0) return damaged(path, complaints);
     }
-    return Done{};
+    uint16_t compression = 1;
+    TIFFGetFieldDefaulted(file.get(), TIFFTAG_COMPRESSION, &compression);
+    const bool is_deflated = compression == COMPRESSION_ADOBE_DEFLATE || compression == COMPRESSION_DEFLATE;
+    return is_deflated ? check_deflate(file.get(), blocks, path) : Done{};
+}
+
+Result<std::vector<uint8_t>> read_bilevel(const std::string& path, int page) {
+    Complaints complaints;
+    const File file = open_tiff(path, complaints);
+    if (!file || !TIFFSetDirectory(file.get(), uint16_t(page))) return damaged(path, complaints);
+    const TiffPage facts = page_of(file.get());
+    if (TIFFIsTiled(file.get())) return fail("'" + path + "' has 1 bit a pixel in tiles: save it with 8 bits");
+    std::vector<uint8_t> row(size_t(TIFFScanlineSize(file.get()))), samples;
+    for (int y = 0; y < facts.height; ++y) {
+        if (TIFFReadScanline(file.get(), row.data(), uint32_t(y)) < 0) return damaged(path, complaints);
+        for (int x = 0; x < facts.width; ++x) samples.push_back(row[size_t(x) / 8] >> (7 - x % 8) & 1);
+    }
+    return samples;
+}
+
+std::optional<DngCrop> dng_default_crop(const std::string& path) {
+    Complaints complaints;
+    const File file = open_tiff(path, complaints);
+    if (!file) return std::nullopt;
+    std::vector<uint64_t> directories = {TIFFCurrentDirOffset(file.get())};
+    const auto subs = sub_directories(file.get());
+    directories.insert(directories.end(), subs.begin(), subs.end());
+    for (const uint64_t offset : directories) {
+        float *origin = nullptr, *size = nullptr;
+        if (!TIFFSetSubDirectory(file.get(), offset)) continue;
+        if (TIFFGetField(file.get(), TIFFTAG_DEFAULTCROPORIGIN, &origin) &&
+            TIFFGetField(file.get(), TIFFTAG_DEFAULTCROPSIZE, &size))
+            return DngCrop{origin[0], origin[1], size[0], size[1]};
+    }
+    return std::nullopt;
 }
 
 }  // namespace ols

@@ -84,7 +84,8 @@ Result<std::vector<LightPosition>> read_lp(const std::string& path) {
     auto file = read_light_file(path);
     if (!file) return file.error();
     if (!file->intensities.empty())
-        return fail("'" + path + "' has intensities behind the directions: only `stagectl ingest` uses them; remove them");
+        return fail("'" + path +
+                    "' has intensities behind the directions: only `stagectl ingest` uses them; remove them");
     return std::move(file->lights);
 }
 

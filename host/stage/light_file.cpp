@@ -10,10 +10,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <string_view>
+
+#include "image/input_file.hpp"
 
 namespace ols {
 
@@ -150,14 +151,12 @@ Status check_directions(const LightFile& file, const std::string& path) {
 }  // namespace
 
 Result<std::vector<TextLine>> read_text_lines(const std::string& path) {
+    auto stream = open_input(path);
+    if (!stream) return stream.error();
     std::error_code error;
-    if (!std::filesystem::exists(path, error)) return fail("cannot open '" + path + "': check the path");
-    if (!std::filesystem::is_regular_file(path, error)) return fail("'" + path + "' is no file: give a text file");
     if (std::filesystem::file_size(path, error) > largest_text || error)
         return fail("'" + path + "' is larger than 64 MB: no list of lights");
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) return fail("cannot open '" + path + "': check its permissions");
-    const auto text = decoded(std::string{std::istreambuf_iterator<char>(stream), {}});
+    const auto text = decoded(std::string{std::istreambuf_iterator<char>(*stream), {}});
     if (!text || text->find('\0') != std::string::npos) return fail("'" + path + "' is no text: save it as UTF-8");
     std::vector<TextLine> lines;
     int number = 1;
