@@ -247,18 +247,6 @@ def test_luminance_and_chroma_become_the_colour_they_were_made_of(tmp_path, spac
     assert error < 1e-3 and "Y RY BY" in said  # halved chroma passes through half floats
 
 
-def test_halved_chroma_is_interpolated_as_the_library_does(tmp_path):
-    """exr2aces reads with RgbaInputFile and writes the primaries of ACES; smooth colours, which fixSaturation() leaves alone."""
-    y, x = np.mgrid[0:32, 0:48]
-    luminance = (1 + 0.5 * np.sin(x / 9) * np.cos(y / 7)).astype(np.float16)
-    red, blue = 0.2 * np.sin(x[::2, ::2] / 8), 0.2 * np.cos(y[::2, ::2] / 9)
-    channels = {"Y": luminance, "RY": red.astype(np.float16), "BY": blue.astype(np.float16)}
-    path = write(tmp_path / "ycc.exr", exr(channels, sampling={"RY": (2, 2), "BY": (2, 2)}))
-    subprocess.run(["exr2aces", path, tmp_path / "aces.exr"], check=True)
-    done = rf("compare", path, tmp_path / "aces.exr", "--json")
-    assert json.loads(done.stdout)["max_error"] < 0.004, done.stdout  # halves, twice
-
-
 # What is said
 
 
