@@ -4,6 +4,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputPart.h>
+#include <ImfIntAttribute.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStdIO.h>
@@ -189,7 +190,18 @@ void say_header(const Imf::Header& header, FloatPicture& picture) {
         picture.said.push_back(fmt::format("its pixels are {:.4g} times as wide as high: taken as square", aspect));
 }
 
+// OpenEXR itself has no such attribute; OpenImageIO writes Exif's, and leaves the pixels as they lie.
+Status check_upright(const Imf::Header& header) {
+    const auto* orientation = header.findTypedAttribute<Imf::IntAttribute>("Orientation");
+    if (!orientation || orientation->value() == 1) return Done{};
+    return fail(
+        fmt::format("its Orientation is {}, so its pixels lie turned or mirrored: `oiiotool IN --reorient -o OUT` sets "
+                    "them upright",
+                    orientation->value()));
+}
+
 Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& layer) {
+    if (const Status upright = check_upright(file.header(layer.part)); !upright) return upright.error();
     if (!file.partComplete(layer.part))
         return fail("it is incomplete (rows or tiles are missing): copy or save it again");
     Imf::InputPart part(file, layer.part);
@@ -215,7 +227,10 @@ Result<FloatPicture> read_stream(std::ifstream& stream, const std::string& path,
     for (int i = 0; i < file.parts(); ++i) headers.push_back(&file.header(i));
     const auto layer = choose_exr_layer(headers, choice);
     if (!layer) return layer.error();
-    return read_part(file, *layer);
+    auto picture = read_part(file, *layer);
+    if (picture && !layer->name.empty() && !choice.layer)
+        picture->said.insert(picture->said.begin(), "its layer '" + layer->name + "' was taken");
+    return picture;
 }
 
 }  // namespace

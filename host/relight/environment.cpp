@@ -2,6 +2,8 @@
 // Projections of environment maps, and reading them.
 #include "relight/environment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -69,6 +71,12 @@ Result<FloatPicture> read_map(const std::string& path, const ExrChoice& choice) 
 bool has_ratio(const Image& image, int width, int height) {
     constexpr double tolerance = 0.01;  // panoramas are cut to whole pixels
     return std::abs(double(image.width) * height / (double(image.height) * width) - 1) < tolerance;
+}
+
+// Of texels far from square each covers many lamps, and no camera or renderer makes such maps.
+bool is_strip(const Image& image) {
+    constexpr int64_t longest = 16;
+    return image.width > longest * image.height || image.height > longest * image.width;
 }
 
 bool is_cube_shaped(const Image& image) {
@@ -166,6 +174,10 @@ Result<Environment> read_environment(const std::string& path, std::optional<EnvC
     if (convention) warn_of_other_layout(*map, *convention, warnings);
     const auto layout = convention ? Result(*convention) : layout_of(*map, warnings);
     if (!layout) return fail("'" + path + "' " + layout.error().message);
+    if (is_strip(map->pixels))
+        return fail(
+            fmt::format("'{}' is {} x {}, which is no map of a sphere: latitude-longitude is 2:1, an angular probe 1:1",
+                        path, map->pixels.width, map->pixels.height));
     if (*layout == EnvConvention::angular && map->pixels.width != map->pixels.height)
         return fail("'" + path +
                     "' is not square, so it is no angular probe: use --env-convention openexr or mirrored");

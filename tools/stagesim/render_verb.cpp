@@ -139,7 +139,7 @@ Status check_files(const RenderOptions& options, size_t lamps) {
     if (options.olat)
         for (size_t lamp = 0; lamp < lamps; ++lamp) outputs.files.push_back(lamp_file(options, lamp));
     else
-        outputs.files = {options.out, options.png};
+        outputs.exr = {options.out}, outputs.png = {options.png};
     return check_outputs(outputs);
 }
 
