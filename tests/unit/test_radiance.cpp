@@ -29,10 +29,10 @@ TEST(Radiance, wide_rows_are_flat_or_have_old_runs) {
         ASSERT_TRUE(picture.ok()) << picture.error().message;
         ASSERT_EQ(picture->pixels.width, width);
         EXPECT_TRUE(picture->said.empty());
-        EXPECT_FLOAT_EQ(picture->pixels.at(0, 0, 2), 0.25f);
+        EXPECT_FLOAT_EQ(picture->pixels.at(0, 0, 2), 64.0f);
         for (int x = 1; x < width; ++x) {
-            ASSERT_FLOAT_EQ(picture->pixels.at(x, 0, 0), 0.125f) << x;
-            ASSERT_FLOAT_EQ(picture->pixels.at(x, 0, 2), 0.5f) << x;
+            ASSERT_FLOAT_EQ(picture->pixels.at(x, 0, 0), 32.0f) << x;
+            ASSERT_FLOAT_EQ(picture->pixels.at(x, 0, 2), 128.0f) << x;
         }
     }
     std::filesystem::remove(path);
