@@ -85,10 +85,13 @@ Status read_variable(std::string_view line, std::string_view name, std::string_v
         const auto one = numbers<1>(value);
         if (!one || !((*one)[0] > 0)) return bad_line(line);
         header.exposure *= (*one)[0];
+        if (!std::isnormal(header.exposure)) return bad_line(line);
     } else if (name == "COLORCORR") {
         const auto three = numbers<3>(value);
         if (!three || !all_positive(*three)) return bad_line(line);
         for (size_t c = 0; c < 3; ++c) header.correction[c] *= (*three)[c];
+        if (!std::all_of(header.correction.begin(), header.correction.end(), [](double v) { return std::isnormal(v); }))
+            return bad_line(line);
     } else if (name == "PRIMARIES") {
         const auto p = numbers<8>(value);
         if (!p) return bad_line(line);

@@ -105,6 +105,15 @@ Result<EnvConvention> layout_of(const FloatPicture& map, std::vector<std::string
     return EnvConvention::openexr;
 }
 
+void warn_of_alpha(const Image& image, std::vector<std::string>& warnings) {
+    if (image.channels != 4) return;
+    for (size_t i = 3; i < image.data.size(); i += 4)
+        if (image.data[i] != 1) {
+            warnings.push_back("its alpha is not used: colours count as they are, multiplied by it");
+            return;
+        }
+}
+
 // What the header says against what the user says, who knows better.
 void warn_of_other_layout(const FloatPicture& map, EnvConvention convention, std::vector<std::string>& warnings) {
     if (map.layout == StatedLayout::cube)
@@ -181,6 +190,7 @@ Result<Environment> read_environment(const std::string& path, std::optional<EnvC
     if (*layout == EnvConvention::angular && map->pixels.width != map->pixels.height)
         return fail("'" + path +
                     "' is not square, so it is no angular probe: use --env-convention openexr or mirrored");
+    warn_of_alpha(map->pixels, warnings);
     Environment environment = make_environment(map->pixels, *layout);
     environment.warnings.insert(environment.warnings.begin(), warnings.begin(), warnings.end());
     return environment;

@@ -10,7 +10,7 @@ import subprocess
 import numpy as np
 import pytest
 from exr_bytes import chromaticities, exr, multi_part_exr, text
-from map_files import REC709, refused, rf, to_rec709, to_xyz, weights, write
+from map_files import BIN, REC709, ROOT, refused, rf, to_rec709, to_xyz, weights, write
 
 generator = np.random.default_rng(15)
 
@@ -175,6 +175,14 @@ def test_rec709_stays_as_it_is_to_the_bit_and_names_of_spaces_count(tmp_path):
     truth = pixels.astype(np.float64) @ to_rec709(SPACES["ap1"]).T
     named = write(tmp_path / "named.exr", exr(rgb(pixels), extra=[text("colorInteropID", "lin_ap1_scene")]))
     assert differs(named, truth, tmp_path)[0] < 1e-6
+    for space in ("ACEScg", "lin_ap1"):
+        named = write(tmp_path / "named.exr", exr(rgb(pixels), extra=[text("oiio:ColorSpace", space)]))
+        assert differs(named, truth, tmp_path)[0] < 1e-6
+    both = [text("colorInteropID", "lin_rec709_scene"), chromaticities(*[v for point in SPACES["ap1"] for v in point])]
+    error, said = differs(write(tmp_path / "both.exr", exr(rgb(pixels), extra=both)), truth, tmp_path)
+    assert error < 1e-6 and "these were taken" in said
+    error, said = differs(write(tmp_path / "srgb.exr", exr(rgb(pixels), extra=[text("oiio:ColorSpace", "sRGB")])), pixels, tmp_path)
+    assert error == 0 and "'sRGB'" in said
     refused(write(tmp_path / "encoded.exr", exr(rgb(pixels), extra=[text("colorInteropID", "srgb_rec709_scene")])), "srgb_rec709_scene")
     refused(write(tmp_path / "data.exr", exr(rgb(pixels), extra=[text("colorInteropID", "data")])), "data")
 
@@ -202,6 +210,22 @@ def test_luminance_and_chroma_become_the_colour_they_were_made_of(tmp_path, spac
 
 
 # What is said
+
+
+def test_alpha_is_not_used_and_that_is_said_unless_it_is_1(tmp_path):
+    pixels = picture(channels=4)
+    plain = weights(write(tmp_path / "plain.exr", exr(rgb(pixels[..., :3]))))
+    given, said = weights(write(tmp_path / "alpha.exr", exr(rgb(pixels))))
+    assert np.array_equal(given, plain[0]) and "alpha is not used" in said
+    pixels[..., 3] = 1
+    assert weights(write(tmp_path / "opaque.exr", exr(rgb(pixels))))[1] == ""
+
+
+def test_the_virtual_stage_says_the_same_in_its_report(tmp_path):
+    square = write(tmp_path / "square.exr", exr(rgb(picture(16, 16))))
+    done = subprocess.run([BIN / "stagesim", "render", ROOT / "tools/stagesim/scenes/card.toml", "--env", square, "-o", tmp_path / "lit.exr", "--json"],
+                          capture_output=True, text=True, check=True)
+    assert done.stderr.count("--env-convention angular") == 1 and "angular" in json.loads(done.stdout)["warnings"][0]
 
 
 def test_pixels_that_lie_turned_are_refused_with_what_turns_them(tmp_path):

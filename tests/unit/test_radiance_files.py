@@ -112,7 +112,7 @@ def test_exposure_and_colour_correction_are_divided_out_all_of_them(tmp_path):
 
 
 @pytest.mark.parametrize("line", [b"EXPOSURE=0", b"EXPOSURE=-1", b"EXPOSURE=nan", b"EXPOSURE=inf", b"EXPOSURE=1e999", b"EXPOSURE=",
-                                  b"EXPOSURE=1,5", b"COLORCORR=1 1", b"COLORCORR=1 1 0", b"PRIMARIES=1 2 3", b"NCOMP=4", b"GAMMA=2.2",
+                                  b"EXPOSURE=1,5", b"EXPOSURE=1e300\nEXPOSURE=1e300", b"EXPOSURE=1e-300\nEXPOSURE=1e-300", b"COLORCORR=1 1e300 1\nCOLORCORR=1 1e300 1", b"COLORCORR=1 1", b"COLORCORR=1 1 0", b"PRIMARIES=1 2 3", b"NCOMP=4", b"GAMMA=2.2",
                                   b"FORMAT=32-bit_rle_spectral", b"PRIMARIES=.3 .3 .3 .3 .3 .3 .3 .3"])
 def test_a_header_that_cannot_be_is_refused_by_its_line(tmp_path, line):
     path = write(tmp_path / "map.hdr", hdr(stored(), header=line + b"\n"))
