@@ -56,7 +56,7 @@ std::optional<ExrLayer> as_picture(const Channels& channels, int part, const std
     if (has_all(channels, {"R", "G", "B"}, 1)) {
         layer.colour = ExrColour::rgb;
         layer.channels = {"R", "G", "B"};
-    } else if (has_all(channels, {"Y"}, 1)) {
+    } else if (has_all(channels, {"Y"}, 1) && !channels.count("X")) {  // X Y are coordinates
         const bool chroma = has_all(channels, {"RY", "BY"}, 1) || has_all(channels, {"RY", "BY"}, 2);
         if (!chroma && (channels.count("RY") || channels.count("BY"))) return std::nullopt;
         layer.colour = chroma ? ExrColour::luminance_chroma : ExrColour::grey;

@@ -4,20 +4,20 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputPart.h>
+#include <ImfIntAttribute.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStdIO.h>
-#include <ImfStringAttribute.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <map>
 
 #include "image/exr.hpp"
 #include "image/exr_choice.hpp"
 #include "image/exr_chroma.hpp"
+#include "image/exr_colour.hpp"
 #include "image/exr_sizes.hpp"
 #include "image/input_file.hpp"
 #include "image/primaries.hpp"
@@ -98,58 +98,8 @@ void say_windows(const Window& data, const Window& display, std::vector<std::str
         said.push_back(windows + (beyond ? "what lies outside was cropped" : "the rest was filled with black"));
 }
 
-// Linear spaces by the names of the Color Interop Forum's recommendation; what none of them says is no linear light.
-const std::map<std::string, Primaries>& linear_spaces() {
-    static const std::map<std::string, Primaries> spaces = {
-        {"lin_rec709_scene", rec709_primaries},
-        {"lin_srgb", rec709_primaries},
-        {"lin_rec2020_scene", {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}}},
-        {"lin_p3d65_scene", {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}}},
-        {"lin_adobergb_scene", {{0.640, 0.330}, {0.210, 0.710}, {0.150, 0.060}, {0.3127, 0.3290}}},
-        {"lin_ap0_scene", {{0.7347, 0.2653}, {0.0, 1.0}, {0.0001, -0.0770}, {0.32168, 0.33767}}},
-        {"lin_ap1_scene", {{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}, {0.32168, 0.33767}}}};
-    return spaces;
-}
-
-std::string text_of(const Imf::Header& header, const char* name) {
-    const auto* text = header.findTypedAttribute<Imf::StringAttribute>(name);
-    return text ? text->value() : "";
-}
-
-struct StatedColour {
-    Primaries primaries = rec709_primaries;
-    bool known = true;
-    std::string said;  // about the label
-};
-
-Chromaticity chromaticity(Imath::V2f v) {
-    return {v.x, v.y};
-}
-
-// Chromaticities first, a colour space's name where there are none.
-Result<StatedColour> stated_colour(const Imf::Header& header) {
-    const std::string name = text_of(header, "colorInteropID");
-    if (name == "data") return fail("its colorInteropID says 'data', so it is no light: name a picture");
-    const auto space = linear_spaces().find(name);
-    const bool other = !name.empty() && name != "unknown" && space == linear_spaces().end();
-    if (other && !(name.starts_with("lin_") && Imf::hasChromaticities(header)))
-        return fail("its colorInteropID '" + name + "' is no linear light known here: convert it to lin_rec709_scene");
-    if (Imf::hasChromaticities(header)) {
-        const auto& c = Imf::chromaticities(header);
-        return StatedColour{
-            {chromaticity(c.red), chromaticity(c.green), chromaticity(c.blue), chromaticity(c.white)}, true, ""};
-    }
-    const std::string by_oiio = text_of(header, "oiio:ColorSpace");
-    if (!by_oiio.empty() && by_oiio != "Linear" && by_oiio != "linear" && by_oiio != "lin_srgb" &&
-        by_oiio != "scene_linear")
-        return StatedColour{
-            rec709_primaries, false,
-            "its oiio:ColorSpace says '" + by_oiio + "', which OpenEXR files are not: taken as linear light"};
-    return StatedColour{space == linear_spaces().end() ? rec709_primaries : space->second, true, ""};
-}
-
 Status make_rec709(FloatPicture& picture, const Imf::Header& header, ExrColour colour) {
-    const auto stated = stated_colour(header);
+    const auto stated = stated_exr_colour(header);
     if (!stated) return stated.error();
     picture.is_rec709 = stated->known;
     if (!stated->said.empty()) picture.said.push_back(stated->said);
@@ -189,7 +139,18 @@ void say_header(const Imf::Header& header, FloatPicture& picture) {
         picture.said.push_back(fmt::format("its pixels are {:.4g} times as wide as high: taken as square", aspect));
 }
 
+// OpenEXR itself has no such attribute; OpenImageIO writes Exif's, and leaves the pixels as they lie.
+Status check_upright(const Imf::Header& header) {
+    const auto* orientation = header.findTypedAttribute<Imf::IntAttribute>("Orientation");
+    if (!orientation || orientation->value() == 1) return Done{};
+    return fail(
+        fmt::format("its Orientation is {}, so its pixels lie turned or mirrored: `oiiotool IN --reorient -o OUT` sets "
+                    "them upright",
+                    orientation->value()));
+}
+
 Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& layer) {
+    if (const Status upright = check_upright(file.header(layer.part)); !upright) return upright.error();
     if (!file.partComplete(layer.part))
         return fail("it is incomplete (rows or tiles are missing): copy or save it again");
     Imf::InputPart part(file, layer.part);
@@ -215,7 +176,10 @@ Result<FloatPicture> read_stream(std::ifstream& stream, const std::string& path,
     for (int i = 0; i < file.parts(); ++i) headers.push_back(&file.header(i));
     const auto layer = choose_exr_layer(headers, choice);
     if (!layer) return layer.error();
-    return read_part(file, *layer);
+    auto picture = read_part(file, *layer);
+    if (picture && !layer->name.empty() && !choice.layer)
+        picture->said.insert(picture->said.begin(), "its layer '" + layer->name + "' was taken");
+    return picture;
 }
 
 }  // namespace

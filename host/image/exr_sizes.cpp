@@ -168,6 +168,11 @@ Status check_part(const PartSizes& part, uint64_t file_bytes) {
     if (part.data.pixels() * part.pixel_bytes > most_bytes) return too_much(part.data.width(), part.data.height(), "");
     if (part.tile_width * part.tile_height * part.pixel_bytes > most_bytes)
         return too_much(part.tile_width, part.tile_height, " in a tile");
+    // The library decodes into whole chunks, however few lines a picture has.
+    const bool tiled = part.tile_width > 0 && part.tile_height > 0;
+    if (const double lines = std::max(codec.lines, 1);
+        !tiled && part.data.width() * lines * part.pixel_bytes > std::max(most_bytes, double(most_chunk_bytes)))
+        return too_much(part.data.width(), lines, " in a chunk");
     const double most = double(most_pixels);
     if (part.data.pixels() > most || part.tile_width * part.tile_height > most || part.display.pixels() > most)
         return fail(fmt::format("it says {:.0f} x {:.0f} pixels, and no more than {} are read: scale it down",

@@ -2,10 +2,10 @@
 // The kind is looked at before the file is opened: opening a pipe waits for whoever writes to it.
 #include "image/input_file.hpp"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <utility>
-
-#include <algorithm>
 
 namespace ols {
 
@@ -56,14 +56,16 @@ std::string kind_of_bytes(std::string_view bytes) {
     return "no file of a kind known here";
 }
 
-Result<std::string> read_input(const std::string& path) {
+Result<std::string> read_input(const std::string& path, uint64_t most) {
     auto stream = open_input(path);
     if (!stream) return stream.error();
-    stream->seekg(0, std::ios::end);
-    std::string bytes(size_t(std::max<std::streamoff>(stream->tellg(), 0)), '\0');
-    stream->seekg(0);
-    stream->read(bytes.data(), std::streamsize(bytes.size()));
-    if (!*stream) return fail("cannot read '" + path + "': check the disk");
+    std::error_code error;
+    const uint64_t size = fs::file_size(path, error);
+    if (error || size > most)
+        return fail(fmt::format("'{}' has {} bytes, and no more than {} are read: check what it is", path, size, most));
+    std::string bytes(size, '\0');
+    stream->read(bytes.data(), std::streamsize(size));
+    if (uint64_t(stream->gcount()) != size) return fail("cannot read '" + path + "': check the disk");
     return bytes;
 }
 

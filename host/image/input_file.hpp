@@ -2,6 +2,7 @@
 // Files that a user names, opened to be read.
 #pragma once
 
+#include <cstdint>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -16,7 +17,7 @@ Result<std::ifstream> open_input(const std::string& path);
 // In words what kind of file begins with these bytes (16 are enough): "a PNG picture", "empty".
 std::string kind_of_bytes(std::string_view bytes);
 
-// All its bytes.
-Result<std::string> read_input(const std::string& path);
+// All its bytes. An error also if they are more than `most`.
+Result<std::string> read_input(const std::string& path, uint64_t most);
 
 }  // namespace ols

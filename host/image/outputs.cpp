@@ -49,12 +49,13 @@ std::string input_that_is(const fs::path& file, const std::vector<std::string>& 
 // Where all outputs will stand, each of which may be written.
 Result<std::vector<Place>> places_of(const Outputs& outputs) {
     std::vector<std::pair<std::string, fs::path>> wanted;
-    for (const auto& name : outputs.files) {
-        if (name.empty()) continue;
-        auto path = output_place(name);
-        if (!path) return path.error();
-        wanted.emplace_back(name, std::move(*path));
-    }
+    for (const auto* names : {&outputs.files, &outputs.exr, &outputs.png})
+        for (const auto& name : *names) {
+            if (name.empty()) continue;
+            auto path = output_place(name);
+            if (!path) return path.error();
+            wanted.emplace_back(name, std::move(*path));
+        }
     for (const auto& name : outputs.folders) {
         if (name.empty()) continue;
         auto path = new_folder_place(name);
@@ -77,6 +78,18 @@ Result<std::vector<Place>> places_of(const Outputs& outputs) {
     return places;
 }
 
+// Whoever opens a file by its name finds what the name says.
+Status check_endings(const std::vector<std::string>& names, const std::string& ending, const char* kind) {
+    for (const auto& name : names) {
+        std::string other = fs::path(name).extension().string();
+        for (char& c : other)
+            if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+        if (name.empty() || other == ending) continue;
+        return fail("cannot write '" + name + "': it becomes " + kind + ": end its name in " + ending);
+    }
+    return Done{};
+}
+
 }  // namespace
 
 Status check_outputs(const Outputs& outputs) {
@@ -93,7 +106,8 @@ Status check_outputs(const Outputs& outputs) {
             return fail("cannot write both '" + other->second + "' and '" + place.name +
                         "': they are one file: give each output a name of its own");
     }
-    return Done{};
+    if (const Status exr = check_endings(outputs.exr, ".exr", "an OpenEXR file"); !exr) return exr;
+    return check_endings(outputs.png, ".png", "a PNG picture");
 }
 
 }  // namespace ols

@@ -59,9 +59,12 @@ bool near(Chromaticity a, Chromaticity b) {
 
 }  // namespace
 
+bool are_same(const Primaries& a, const Primaries& b) {
+    return near(a.red, b.red) && near(a.green, b.green) && near(a.blue, b.blue) && near(a.white, b.white);
+}
+
 bool are_rec709(const Primaries& p) {
-    const Primaries& r = rec709_primaries;
-    return near(p.red, r.red) && near(p.green, r.green) && near(p.blue, r.blue) && near(p.white, r.white);
+    return are_same(p, rec709_primaries);
 }
 
 Status convert_to_rec709(Image& rgb, const Primaries& from) {

@@ -21,6 +21,7 @@ inline constexpr Primaries rec709_primaries = {{0.64, 0.33}, {0.30, 0.60}, {0.15
 inline constexpr Chromaticity equal_energy_white = {1.0 / 3, 1.0 / 3};
 
 // Within 1e-4 in every coordinate, which is what files round to.
+bool are_same(const Primaries& a, const Primaries& b);
 bool are_rec709(const Primaries& primaries);
 
 // Converts the first three channels; white stays white (1, 1, 1), adapted by Bradford's cone responses (ICC.1:2022, annex E.3).

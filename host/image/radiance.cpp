@@ -18,6 +18,8 @@ namespace ols {
 
 namespace {
 
+// Four bytes a pixel, a little more for rows that runs do not shorten, and a header.
+constexpr uint64_t most_file_bytes = 5 * most_pixels;
 constexpr double lumens_per_watt = 179;  // WHTEFFICACY in Radiance's color.h
 
 struct Header {
@@ -38,10 +40,14 @@ std::optional<std::string_view> take_line(std::string_view& rest) {
     return line;
 }
 
-std::string_view trimmed(std::string_view text) {
-    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+std::string_view without_blanks_behind(std::string_view text) {
     while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
     return text;
+}
+
+std::string_view trimmed(std::string_view text) {
+    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+    return without_blanks_behind(text);
 }
 
 // Exactly N finite numbers.
@@ -79,10 +85,13 @@ Status read_variable(std::string_view line, std::string_view name, std::string_v
         const auto one = numbers<1>(value);
         if (!one || !((*one)[0] > 0)) return bad_line(line);
         header.exposure *= (*one)[0];
+        if (!std::isnormal(header.exposure)) return bad_line(line);
     } else if (name == "COLORCORR") {
         const auto three = numbers<3>(value);
         if (!three || !all_positive(*three)) return bad_line(line);
         for (size_t c = 0; c < 3; ++c) header.correction[c] *= (*three)[c];
+        if (!std::all_of(header.correction.begin(), header.correction.end(), [](double v) { return std::isnormal(v); }))
+            return bad_line(line);
     } else if (name == "PRIMARIES") {
         const auto p = numbers<8>(value);
         if (!p) return bad_line(line);
@@ -116,7 +125,8 @@ Result<Header> read_header(std::string_view& rest) {
         if (line->empty()) return header;
         const size_t equals = line->find('=');
         if (line->starts_with('#') || equals == std::string_view::npos) continue;
-        const Status done = read_variable(*line, line->substr(0, equals), line->substr(equals + 1), header);
+        const Status done =
+            read_variable(*line, without_blanks_behind(line->substr(0, equals)), line->substr(equals + 1), header);
         if (!done) return done.error();
     }
 }
@@ -182,6 +192,7 @@ Status make_rec709(FloatPicture& picture, const Header& header) {
     if (header.xyz) {
         picture.said.push_back(
             fmt::format("CIE XYZ in candelas/m2 (XYZE) was converted to Rec. 709 by {} lm/W", lumens_per_watt));
+        if (header.primaries) picture.said.push_back("its PRIMARIES were not used: XYZ has its own");
         return convert_xyz_to_rec709(picture.pixels, equal_energy_white);
     }
     if (!header.primaries || are_rec709(*header.primaries)) return Done{};
@@ -228,7 +239,7 @@ bool begins_as_radiance(std::string_view bytes) {
 
 Result<FloatPicture> read_radiance(const std::string& path) {
     try {
-        const auto bytes = read_input(path);
+        const auto bytes = read_input(path, most_file_bytes);
         if (!bytes) return bytes.error();
         if (!begins_as_radiance(*bytes))
             return fail("cannot read '" + path + "' as Radiance: it is " + kind_of_bytes(*bytes) +

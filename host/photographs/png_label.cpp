@@ -13,6 +13,8 @@ namespace ols {
 
 namespace {
 
+constexpr uint64_t largest_file = uint64_t(1) << 32;
+
 uint32_t word(std::string_view bytes, size_t at) {
     uint32_t value = 0;
     for (size_t i = 0; i < 4; ++i) value = value << 8 | (unsigned char)bytes[at + i];
@@ -77,7 +79,7 @@ Status take_chunk(std::string_view type, std::string_view data, ColorLabel& labe
 }  // namespace
 
 Result<ColorLabel> read_png_label(const std::string& path) {
-    const auto bytes = read_input(path);
+    const auto bytes = read_input(path, largest_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
     const auto damaged = [&](const std::string& why) {

@@ -2,6 +2,8 @@
 // Projections of environment maps, and reading them.
 #include "relight/environment.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -71,6 +73,12 @@ bool has_ratio(const Image& image, int width, int height) {
     return std::abs(double(image.width) * height / (double(image.height) * width) - 1) < tolerance;
 }
 
+// Of texels far from square each covers many lamps, and no camera or renderer makes such maps.
+bool is_strip(const Image& image) {
+    constexpr int64_t longest = 16;
+    return image.width > longest * image.height || image.height > longest * image.width;
+}
+
 bool is_cube_shaped(const Image& image) {
     return has_ratio(image, 6, 1) || has_ratio(image, 1, 6) || has_ratio(image, 4, 3) || has_ratio(image, 3, 4);
 }
@@ -95,6 +103,15 @@ Result<EnvConvention> layout_of(const FloatPicture& map, std::vector<std::string
             " and was taken as latitude-longitude, which is twice as wide as high: check it, or say what it is with "
             "--env-convention");
     return EnvConvention::openexr;
+}
+
+void warn_of_alpha(const Image& image, std::vector<std::string>& warnings) {
+    if (image.channels != 4) return;
+    for (size_t i = 3; i < image.data.size(); i += 4)
+        if (image.data[i] != 1) {
+            warnings.push_back("its alpha is not used: colours count as they are, multiplied by it");
+            return;
+        }
 }
 
 // What the header says against what the user says, who knows better.
@@ -166,9 +183,14 @@ Result<Environment> read_environment(const std::string& path, std::optional<EnvC
     if (convention) warn_of_other_layout(*map, *convention, warnings);
     const auto layout = convention ? Result(*convention) : layout_of(*map, warnings);
     if (!layout) return fail("'" + path + "' " + layout.error().message);
+    if (is_strip(map->pixels))
+        return fail(
+            fmt::format("'{}' is {} x {}, which is no map of a sphere: latitude-longitude is 2:1, an angular probe 1:1",
+                        path, map->pixels.width, map->pixels.height));
     if (*layout == EnvConvention::angular && map->pixels.width != map->pixels.height)
         return fail("'" + path +
                     "' is not square, so it is no angular probe: use --env-convention openexr or mirrored");
+    warn_of_alpha(map->pixels, warnings);
     Environment environment = make_environment(map->pixels, *layout);
     environment.warnings.insert(environment.warnings.begin(), warnings.begin(), warnings.end());
     return environment;

@@ -164,3 +164,37 @@ def test_an_export_of_all_targets_is_refused_before_the_first_where_one_has_no_p
     (tmp_path / "lamps_000003").mkdir()
     assert "lamps_000003' exists" in run("rf", "export", take, "--target", "all", "-o", tmp_path / "lamps", code=1)
     assert not (tmp_path / "lamps_000000").exists()
+
+
+def test_a_name_that_ends_as_another_kind_of_file_is_refused(take, tmp_path):
+    before = contents(tmp_path)
+    for name in ("lit.png", "lit.jpg", "lit.exr.png", "lit", "lit.", "exr", ".exr"):
+        assert ".exr" in relight(take, "-o", tmp_path / name, code=1)
+        assert ".exr" in run("stagesim", "render", SCENE, "--lamps", "1", "-o", tmp_path / name, code=1)
+    for name in ("lit.jpg", "other.exr", "lit"):
+        assert ".png" in relight(take, "-o", tmp_path / "lit.exr", "--png", tmp_path / name, code=1)
+        assert ".png" in run("rf", "export", take, "--contact-sheet", tmp_path / name, code=1)
+    assert contents(tmp_path) == before
+    relight(take, "-o", tmp_path / "lit.EXR", "--png", tmp_path / "lit.Png")
+    assert (tmp_path / "lit.EXR").read_bytes()[:4] == b"\x76\x2f\x31\x01" and (tmp_path / "lit.Png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_folder_that_is_not_there_is_named_before_anything_is_done(take, tmp_path):
+    before = contents(tmp_path)
+    for said in (relight(take, "-o", tmp_path / "no/lit.exr", code=1), relight(take, "-o", tmp_path / "lit.exr", "--png", tmp_path / "no/lit.png", code=1),
+                 run("rf", "export", take, "-o", tmp_path / "no/lamps", code=1), run("rf", "export", take, "--contact-sheet", tmp_path / "no/sheet.png", code=1),
+                 run("stagesim", "render", SCENE, "--lamps", "1", "-o", tmp_path / "no/lit.exr", code=1)):
+        assert str(tmp_path / "no") in said and "check that the folder exists" in said and said.count("\n") == 1
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("target", ["1-5", "1,2", "-1", "+1", "0x0", "last", "ALL", " 0", "0 ", "1e0", "4294967296"])
+def test_targets_that_are_no_choice_are_refused_as_such(take, tmp_path, target):
+    said = relight(take, f"--target={target}", "-o", tmp_path / "lit.exr", code=1)
+    assert "--target" in said and "`first`" in said and "`all`" in said
+    assert "--target" in run("rf", "export", take, f"--target={target}", "-o", tmp_path / "lamps", code=1)
+
+
+def test_a_target_that_is_not_there_is_named(take, tmp_path):
+    assert "no finished target 7" in relight(take, "--target", "7", "-o", tmp_path / "lit.exr", code=1)
+    relight(take, "--target", "0", "-o", tmp_path / "lit.exr")

@@ -27,17 +27,21 @@ nlohmann::json finite_or_null(double value) {
     return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
-Result<Image> read_and_warn(const std::string& path) {
+Result<Image> read_and_warn(const std::string& path, std::vector<std::string>& warnings) {
     auto picture = read_exr_picture(path);
     if (!picture) return picture.error();
-    for (const auto& warning : picture->said) fmt::print(stderr, "rf compare: {}: {}\n", path, warning);
+    for (const auto& warning : picture->said) {
+        warnings.push_back(path + ": " + warning);
+        fmt::print(stderr, "rf compare: {}\n", warnings.back());
+    }
     return std::move(picture->pixels);
 }
 
 Status run(const Options& options) {
-    const auto image = read_and_warn(options.image);
+    std::vector<std::string> warnings;
+    const auto image = read_and_warn(options.image, warnings);
     if (!image) return image.error();
-    const auto reference = read_and_warn(options.reference);
+    const auto reference = read_and_warn(options.reference, warnings);
     if (!reference) return reference.error();
     if (image->width != reference->width || image->height != reference->height ||
         std::min(image->channels, 3) != std::min(reference->channels, 3))
@@ -52,7 +56,8 @@ Status run(const Options& options) {
                                        {"max_error", finite_or_null(d.max_error)},
                                        {"mean_relative", finite_or_null(d.mean_relative)},
                                        {"bias_relative", finite_or_null(d.bias_relative)},
-                                       {"equal", d.max_error == 0}};
+                                       {"equal", d.max_error == 0},
+                                       {"warnings", warnings}};
         print_json(report);
     } else {
         fmt::print("PSNR {:.2f} dB (peak {:.6g}), largest error {:.6g}, mean error {:.4f} %, bias {:+.4f} %\n",

@@ -112,7 +112,7 @@ struct Export {
 Status check_places(const Options& options, const std::vector<TargetEntry>& targets) {
     Outputs outputs{.inputs = {options.archive}};
     for (const auto& entry : targets) {
-        outputs.files.push_back(file_of_target(options.contact_sheet, entry, options.targets));
+        outputs.png.push_back(file_of_target(options.contact_sheet, entry, options.targets));
         outputs.folders.push_back(folder_of_target(options.output, entry, options.targets));
     }
     return check_outputs(outputs);

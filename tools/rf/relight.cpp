@@ -163,9 +163,10 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
 
 Status check_files(const Options& options, const std::vector<TargetEntry>& targets) {
     Outputs outputs{.inputs = {options.archive, options.lighting.environment}};
-    for (const auto& entry : targets)
-        for (const auto& path : {options.output, options.png})
-            outputs.files.push_back(file_of_target(path, entry, options.targets));
+    for (const auto& entry : targets) {
+        outputs.exr.push_back(file_of_target(options.output, entry, options.targets));
+        outputs.png.push_back(file_of_target(options.png, entry, options.targets));
+    }
     return check_outputs(outputs);
 }
 
@@ -211,8 +212,8 @@ void add_relight_verb(CLI::App& app, int& exit_code) {
     options->lighting.add_to(*verb);
     options->shutter.add_to(*verb);
     options->targets.add_to(*verb);
-    verb->add_option("-o,--output", options->output, "OpenEXR file to write (R G B A)")->required();
-    verb->add_option("--png", options->png, "8-bit preview to write");
+    verb->add_option("-o,--output", options->output, "OpenEXR file to write (.exr; R G B A)")->required();
+    verb->add_option("--png", options->png, "8-bit preview to write (.png)");
     verb->add_flag("--float", options->single_float, "32-bit samples instead of 16-bit halves");
     verb->add_option("--threads", options->threads, "0: one a core; the result is the same for any number")
         ->check(CLI::Range(0, 1024));

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <charconv>
 #include <filesystem>
 
 namespace ols {
@@ -37,8 +38,22 @@ nlohmann::json TargetChoice::missing_json() const {
     return runs;
 }
 
+namespace {
+
+// An error unless it is one number, `first` or `all`.
+Status check_target(const std::string& target) {
+    uint32_t number = 0;
+    const char* end = target.data() + target.size();
+    const auto [stop, error] = std::from_chars(target.data(), end, number);
+    if (target == "first" || target == "all" || (error == std::errc() && stop == end)) return Done{};
+    return fail("--target '" + target + "' is neither one number nor `first` nor `all`: choose one of these");
+}
+
+}  // namespace
+
 Result<TargetChoice> choose_targets(const ArchiveReader& archive, const std::string& path,
                                     const TargetOptions& options) {
+    if (const Status known = check_target(options.target); !known) return known.error();
     TargetChoice all;
     for (const auto& entry : archive.targets()) {
         if (entry.camera != options.camera) continue;

@@ -51,7 +51,8 @@ Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) 
 }
 
 // What `rf relight` gives a lamp: its share of the environment over pi.
-Result<std::vector<Float3>> environment_weights(const RenderOptions& options, const StageConfig& stage) {
+Result<std::vector<Float3>> environment_weights(const RenderOptions& options, const StageConfig& stage,
+                                                std::vector<std::string>& warnings) {
     std::optional<EnvConvention> convention;
     if (!options.env_convention.empty()) {
         const auto parsed = parse_env_convention(options.env_convention);
@@ -60,8 +61,10 @@ Result<std::vector<Float3>> environment_weights(const RenderOptions& options, co
     }
     const auto environment = read_environment(options.env, convention, options.env_picture);
     if (!environment) return environment.error();
-    for (const auto& warning : environment->warnings)
-        fmt::print(stderr, "stagesim render: {}: {}\n", options.env, warning);
+    for (const auto& warning : environment->warnings) {
+        warnings.push_back(options.env + ": " + warning);
+        fmt::print(stderr, "stagesim render: {}\n", warnings.back());
+    }
     std::vector<Vec3> directions;
     for (const LightPosition& lamp : stage.lamps) directions.push_back(lamp.direction);
     const auto cells = SphereCells::make(directions);
@@ -76,9 +79,10 @@ Result<std::vector<Float3>> environment_weights(const RenderOptions& options, co
     return result;
 }
 
-Result<std::vector<Float3>> chosen_weights(const RenderOptions& options, const StageConfig& stage) {
+Result<std::vector<Float3>> chosen_weights(const RenderOptions& options, const StageConfig& stage,
+                                           std::vector<std::string>& warnings) {
     const size_t count = size_t(stage.lamp_count());
-    if (!options.env.empty()) return environment_weights(options, stage);
+    if (!options.env.empty()) return environment_weights(options, stage, warnings);
     if (!options.weights.empty()) return read_weights(options.weights, count);
     std::vector<Float3> weights(count);
     if (options.all_lamps)
@@ -139,14 +143,16 @@ Status check_files(const RenderOptions& options, size_t lamps) {
     if (options.olat)
         for (size_t lamp = 0; lamp < lamps; ++lamp) outputs.files.push_back(lamp_file(options, lamp));
     else
-        outputs.files = {options.out, options.png};
+        outputs.exr = {options.out}, outputs.png = {options.png};
     return check_outputs(outputs);
 }
 
-nlohmann::json report(const RenderOptions& options, const Inputs& inputs, size_t lamps) {
+nlohmann::json report(const RenderOptions& options, const Inputs& inputs, size_t lamps,
+                      const std::vector<std::string>& warnings) {
     nlohmann::json report = {{"output", options.out},          {"png", options.png},   {"width", inputs.camera.width},
                              {"height", inputs.camera.height}, {"unit", options.unit}, {"at_us", options.time_us}};
     if (options.olat) report["pictures"] = lamps;
+    report["warnings"] = warnings;
     return report;
 }
 
@@ -157,14 +163,16 @@ Status render(const RenderOptions& options) {
     if (options.olat)
         if (const Status made = make_folder(options.out); !made) return made;
     if (const Status writable = check_files(options, lamps); !writable) return writable;
-    const auto weights = options.olat ? Result(std::vector<Float3>()) : chosen_weights(options, inputs->stage);
+    std::vector<std::string> warnings;
+    const auto weights =
+        options.olat ? Result(std::vector<Float3>()) : chosen_weights(options, inputs->stage, warnings);
     if (!weights) return weights.error();
     // Linear light: no sensor; gain and vignetting come with --unit counts.
     Renderer renderer(inputs->setup(false), options.inputs.disabled_set());
     const Status done =
         options.olat ? render_olat(options, renderer, inputs->camera)
                      : write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
-    if (done && options.json) print_json(report(options, *inputs, lamps));
+    if (done && options.json) print_json(report(options, *inputs, lamps, warnings));
     return done;
 }
 
