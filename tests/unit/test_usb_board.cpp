@@ -13,6 +13,11 @@ using namespace ols::test;
 
 namespace {
 
+Deadline within_a_minute() {
+    static Patience patience(60'000);
+    return patience.begin_exchange();
+}
+
 class UsbBoards : public testing::Test {
   protected:
     void SetUp() override {
@@ -100,14 +105,14 @@ TEST(UsbTransfer, passes_over_the_empty_packet_that_ends_a_message) {
     ScriptedBus bus;
     bus.reads = {{UsbOutcome::done, 0}, {UsbOutcome::done, 3}};
     const auto transfer = open_usb_transfer(bus, {});
-    EXPECT_EQ(*(*transfer)->read(64, 1500), Bytes(3, 0x55));
+    EXPECT_EQ(*(*transfer)->read(64, 1500, within_a_minute()), Bytes(3, 0x55));
 }
 
 TEST(UsbTransfer, gives_up_a_board_that_sends_nothing_but_empty_packets) {
     ScriptedBus bus;
     bus.reads.assign(1000, {UsbOutcome::done, 0});
     const auto transfer = open_usb_transfer(bus, {});
-    const auto read = (*transfer)->read(64, 1500);
+    const auto read = (*transfer)->read(64, 1500, within_a_minute());
     ASSERT_FALSE(read.ok());
     EXPECT_NE(read.error().message.find("empty packets"), std::string::npos) << read.error().message;
 }
@@ -117,7 +122,7 @@ TEST(UsbTransfer, names_each_way_in_which_a_transfer_ends_early) {
     bus.reads = {{UsbOutcome::stalled, 0}, {UsbOutcome::timed_out, 0}, {UsbOutcome::gone, 0}, {UsbOutcome::failed, 0}};
     const auto transfer = open_usb_transfer(bus, {});
     for (const char* expected : {"stalled", "in time", "unplugged", "cable"}) {
-        const auto read = (*transfer)->read(64, 1500);
+        const auto read = (*transfer)->read(64, 1500, within_a_minute());
         ASSERT_FALSE(read.ok());
         EXPECT_NE(read.error().message.find(expected), std::string::npos) << read.error().message;
     }
