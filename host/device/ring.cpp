@@ -211,6 +211,12 @@ void RingWriter::close() {
 
 // What the reader keeps to itself.
 struct RingReader::State {
+    // Seen by an access, or by the file's size where nothing has been accessed since.
+    bool is_cut() const {
+        struct stat info {};
+        return mapping.memory.cut() || fstat(mapping.fd, &info) != 0 || size_t(info.st_size) < mapping.memory.size();
+    }
+
     RingMapping mapping;
     std::atomic<uint64_t> tail = 0;
     std::atomic<bool> wanted = false;   // from a start, answered or not, to the stop
@@ -269,6 +275,7 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     state_->wanted = true;
     header.running.store(0, std::memory_order_release);
     const uint32_t start = header.asked.load(std::memory_order_relaxed) + 1;
+    const uint32_t answered_before = header.started.load(std::memory_order_acquire);
     header.asked.store(start, std::memory_order_release);
     header.running.store(1, std::memory_order_release);
     // A writer that waits for room sees that what it waits with is not wanted any more. Room is made when it has answered: what
@@ -278,7 +285,10 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     for (;;) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
         if (!state_->wanted) return fail("the camera was stopped while it started");
-        if (header.started.load(std::memory_order_acquire) == start) break;
+        const uint32_t answered = header.started.load(std::memory_order_acquire);
+        if (answered == start) break;
+        // An answer to an earlier start may come late.
+        if (start - answered > start - answered_before) state_->problem = "it answers a start that was not asked for";
         const Writer now = writer();
         if (now == Writer::broken)
             return fail("the camera's ring is broken, " + problem() + ": start the program that fills it again");
@@ -374,7 +384,7 @@ RingReader::Writer RingReader::writer() const {
     const bool closed = state_->closed, lives = is_taken(state_->mapping.fd, End::writer);
     const bool has_frames =
         state_->running && state_->mapping.header().head.load(std::memory_order_acquire) != state_->tail;
-    if (state_->mapping.memory.cut()) state_->problem = "its file was cut short";
+    if (state_->is_cut()) state_->problem = "its file was cut short";
     if (state_->problem) return Writer::broken;
     if ((lives && !closed) || has_frames) return Writer::live;
     return state_->closed || state_->mapping.header().closed.load(std::memory_order_acquire) ? Writer::closed

@@ -25,7 +25,9 @@ constexpr int read_pause_ms = 20;
 constexpr int silent_looks_max = Camera::device_patience_ms / read_pause_ms;
 // After the board's end a camera that lives is behind by what its driver keeps: some tens of frames. One that is not at its end
 // after so long, by the wall's clock, never will be; nor is it waited for as long when the user has stopped the take.
-constexpr std::chrono::seconds ending_patience(300), stopped_patience(20);
+constexpr std::chrono::seconds ending_patience(300), stopped_patience(10);
+// Frames from behind the last trigger by which those before it have come, be some of them late.
+constexpr size_t late_frames_max = 2 * IdentifyOptions{}.reorder_frames;
 // A camera that has not seen one trigger cannot tell when the last one was due. By its own clock it is given so long after the
 // board's end.
 constexpr uint64_t blind_patience_ns = 10'000'000'000;
@@ -157,8 +159,10 @@ class Recording {
         ++report_.frames;
         if (!news.witness.whole && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
         silent_looks_ = 0;
+        const uint64_t timestamp_ns = news.witness.stamp.timestamp_ns;
         frames_[news.witness.arrival] = std::move(news.frame);
         identifier_.add_frame(std::move(news.witness));
+        if (log_ended_) finish_if_beyond(timestamp_ns);
     }
     void take(LogNews news) {
         fired_ = std::max(fired_, news.next_counter);
@@ -188,13 +192,20 @@ class Recording {
         else if (silent_looks_ > silent_looks_max)
             finish("the camera showed no sign of life for a minute: check it, or the program that reads it");
     }
+    // A camera that no trigger holds back does not pause. All has come when it has gone beyond the last trigger, by its time or
+    // by more frames than there are triggers.
+    void finish_if_beyond(uint64_t timestamp_ns) {
+        if (has_delivered_all(timestamp_ns)) ++frames_beyond_;
+        ++frames_after_end_;
+        if (frames_beyond_ > late_frames_max || frames_after_end_ > fired_ + late_frames_max) finish("");
+    }
     void finish(std::string why) {
         identifier_.end_frames(why);
         report_.camera_end = std::move(why);
         finished_ = true;
     }
 
-    // By the camera's own word: its watermark is past the last trigger that was fired.
+    // By the camera's own word: its watermark, or a frame's time, is past the last trigger that was fired.
     bool has_delivered_all(uint64_t watermark_ns) const {
         if (fired_ == 0) return true;
         const auto last_ns = identifier_.placer().latest_time_of_ns(fired_ - 1);
@@ -233,6 +244,7 @@ class Recording {
     RecordReport report_;
     uint64_t fired_ = 0, last_watermark_ns_ = 0, log_end_watermark_ns_ = 0;
     int silent_looks_ = 0;
+    uint64_t frames_after_end_ = 0, frames_beyond_ = 0;  // of the log; of these, from behind the last trigger
     CameraState camera_state_;
     bool log_ended_ = false, finished_ = false;
     Clock::time_point log_end_;
