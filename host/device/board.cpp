@@ -170,6 +170,7 @@ Status Board::receive(Exchange& exchange) {
         if (!bytes.ok()) return bytes.error();
         received_ = std::move(*bytes);
         exchange.bytes_left -= std::min(exchange.bytes_left, std::max<size_t>(received_.size(), 1));
+        if (received_.empty()) return Done{};
     }
     const size_t taken = ols_frame_parser_write(parser_.get(), received_.data(), received_.size());
     received_.erase(received_.begin(), received_.begin() + ptrdiff_t(taken));

@@ -3,7 +3,6 @@
 Ctrl-C ends a wait that is longer than somebody's patience. The board is tests/unit/fake_board.py, which shares no code with ours."""
 import concurrent.futures
 import os
-import os
 import pathlib
 import random
 import re
