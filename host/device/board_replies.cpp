@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace ols {
@@ -126,7 +127,7 @@ Result<CycleDigests> parse_digests(std::span<const uint8_t> payload, const ols_r
 }
 
 std::string printable(std::span<const char> text) {
-    std::string ascii(text.data(), strnlen(text.data(), text.size()));
+    std::string ascii(text.begin(), std::find(text.begin(), text.end(), '\0'));
     for (char& c : ascii)
         if (c < ' ' || c > '~') c = '?';
     return ascii;

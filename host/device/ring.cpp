@@ -67,6 +67,7 @@ bool is_sound(const RingFrame& frame, const RingLayout& layout) {
     const uint64_t row_bytes = frame.width * uint64_t(samples_per_pixel(frame.cfa)) * sample_bytes;
     return frame.format == content.format && frame.cfa == content.cfa && frame.width <= content.width &&
            frame.height <= content.height && frame.pitch_bytes >= row_bytes && frame.pitch_bytes % sample_bytes == 0 &&
+           uint64_t(frame.pitch_bytes) * frame.height <= frame.bytes &&
            frame.bytes <= layout.stride - sizeof(RingFrame) && std::isfinite(frame.black) &&
            std::isfinite(frame.white) && frame.black < frame.white;
 }
@@ -362,7 +363,7 @@ Frame RingReader::take_frame() {
     frame.white = meta.white;
     if (is_sound(meta, mapping.layout)) {
         const std::byte* samples = record + sizeof meta;
-        frame.samples.assign(samples, samples + std::min(meta.bytes, uint64_t(meta.pitch_bytes) * meta.height));
+        frame.samples.assign(samples, samples + size_t(meta.pitch_bytes) * meta.height);
     }
     ++state_->tail;
     mapping.header().tail.store(state_->tail, std::memory_order_release);
