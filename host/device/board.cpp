@@ -17,8 +17,9 @@ constexpr uint32_t reply_timeout_us = 1'000'000;
 // Of 22 bytes each: two packets. The board takes in one and keeps another while it waits for somebody to read its first
 // reply; a third would not be taken, and the write not end.
 constexpr uint32_t log_messages_at_once = 4;
-// Reads in which a reply must have come: it is one frame, a byte a read at worst, behind those to a few requests given up.
-constexpr int reads_a_reply = 10 * OLS_FRAME_BYTES_MAX;
+// Bytes among which a reply must be: it is one frame, behind those to a few requests given up. A read of nothing counts as one.
+constexpr size_t bytes_a_reply = 16 * OLS_FRAME_BYTES_MAX;
+constexpr int last_word_ms = 1000;
 constexpr size_t packet_bytes = 64;  // full-speed bulk: a read must hold whole packets
 constexpr size_t read_bytes = (OLS_FRAME_BYTES_MAX + packet_bytes - 1) / packet_bytes * packet_bytes;
 
@@ -27,18 +28,11 @@ std::span<const uint8_t> bytes_of(const T& value) {
     return {reinterpret_cast<const uint8_t*>(&value), sizeof value};
 }
 
-Error refusal(std::span<const uint8_t> payload) {
-    ols_error_reply error{};
-    std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));
-    const std::string text(error.text, strnlen(error.text, sizeof error.text));
-    if (error.slot == OLS_NO_SLOT) return fail("the board refused: " + text);
-    return fail(fmt::format("the board refused: {} (slot {})", text, uint16_t(error.slot)));
-}
-
-Error wrong_reply() {
-    return fail(
-        "the board's reply has a length that this release does not know: flash the firmware of this release: "
-        "make flash");
+template <size_t N>
+void make_printable(char (&text)[N]) {
+    const std::string ascii = printable(std::span<const char>(text, N - 1));
+    std::memset(text, 0, N);
+    std::memcpy(text, ascii.data(), ascii.size());
 }
 
 }  // namespace
@@ -100,33 +94,47 @@ const char* state_name(uint8_t state) {
     }
 }
 
-Board::Board(std::unique_ptr<Transfer> transfer)
-    : transfer_(std::move(transfer)), parser_(std::make_unique<ols_frame_parser>()) {}
+Board::Board(std::unique_ptr<Transfer> transfer, const Patience& patience)
+    : transfer_(std::move(transfer)), patience_(patience), parser_(std::make_unique<ols_frame_parser>()) {}
 
-Result<Board> Board::connect(std::unique_ptr<Transfer> transfer) {
-    auto board = connect_any_layout(std::move(transfer));
+Error Board::refusal(std::span<const uint8_t> payload) const {
+    ols_error_reply error{};
+    std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));
+    const std::string text = printable(error.text);
+    if (error.slot == OLS_NO_SLOT) return says("refused: " + text);
+    return says(fmt::format("refused: {} (slot {})", text, uint16_t(error.slot)));
+}
+
+Error Board::wrong_length(uint16_t type, size_t bytes) const {
+    return says(fmt::format(
+        "answered message {:#04x} with {} bytes, which this release does not know: flash the firmware of this "
+        "release: make flash",
+        type, bytes));
+}
+
+Result<Board> Board::connect(std::unique_ptr<Transfer> transfer, const Patience& patience) {
+    auto board = connect_any_layout(std::move(transfer), patience);
     if (board.ok() && !board->same_layout())
-        return fail(
-            fmt::format("the board speaks message layout {:016x} and this program {:016x}: flash the firmware "
-                        "of this release: make flash",
+        return board->says(
+            fmt::format("speaks message layout {:016x} and this program {:016x}: flash the firmware of this release: "
+                        "make flash",
                         board->layout_hash(), uint64_t(OLS_LAYOUT_HASH)));
     return board;
 }
 
-Result<Board> Board::connect_any_layout(std::unique_ptr<Transfer> transfer) {
-    Board board(std::move(transfer));
+Result<Board> Board::connect_any_layout(std::unique_ptr<Transfer> transfer, const Patience& patience) {
+    Board board(std::move(transfer), patience);
     const ols_hello hello{OLS_LAYOUT_HASH};
     const auto payload = board.request(OLS_HELLO, bytes_of(hello));
     if (!payload.ok()) return payload.error();
     // The hash, the first member, comes first in every version of the reply, so it is compared before the length.
-    std::memcpy(static_cast<void*>(&board.info_), payload->data(), std::min(payload->size(), sizeof(uint64_t)));
-    if (payload->size() != sizeof board.info_) {
-        if (board.same_layout()) return wrong_reply();
-        return board;
-    }
+    if (payload->size() < sizeof board.info_.layout_hash) return board.wrong_length(OLS_HELLO, payload->size());
+    std::memcpy(static_cast<void*>(&board.info_), payload->data(), sizeof board.info_.layout_hash);
+    if (!board.same_layout()) return board;
+    if (payload->size() != sizeof board.info_) return board.wrong_length(OLS_HELLO, payload->size());
     std::memcpy(&board.info_, payload->data(), sizeof board.info_);
-    board.info_.firmware_version[sizeof board.info_.firmware_version - 1] = 0;
-    board.info_.board[sizeof board.info_.board - 1] = 0;
+    make_printable(board.info_.firmware_version);
+    make_printable(board.info_.board);
     return board;
 }
 
@@ -149,8 +157,28 @@ uint16_t Board::add_request(uint16_t type, std::span<const uint8_t> payload, std
     return request_id;
 }
 
-Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id) {
-    for (int reads = 0; reads < reads_a_reply;) {
+Board::Exchange Board::begin(size_t requests) {
+    return {begin_exchange(), requests * bytes_a_reply};
+}
+
+// Gives the parser what has come, or waits for more.
+Status Board::receive(Exchange& exchange) {
+    if (received_.empty()) {
+        if (exchange.bytes_left == 0)
+            return says("sends, but not the answer to what it was asked: reset it and start over");
+        auto bytes = transfer_->read(read_bytes, reply_timeout_us, exchange.deadline);
+        if (!bytes.ok()) return bytes.error();
+        received_ = std::move(*bytes);
+        exchange.bytes_left -= std::min(exchange.bytes_left, std::max<size_t>(received_.size(), 1));
+        if (received_.empty()) return Done{};
+    }
+    const size_t taken = ols_frame_parser_write(parser_.get(), received_.data(), received_.size());
+    received_.erase(received_.begin(), received_.begin() + ptrdiff_t(taken));
+    return Done{};
+}
+
+Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id, Exchange& exchange) {
+    for (;;) {
         ols_frame reply;
         while (ols_frame_parser_read(parser_.get(), &reply)) {
             // A reply to a request that was given up earlier is nobody's any more.
@@ -158,37 +186,34 @@ Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t reque
             const std::span<const uint8_t> content(reply.payload, reply.payload_bytes);
             if (reply.type == (OLS_ERROR | OLS_REPLY)) return refusal(content);
             if (reply.type == (type | OLS_REPLY)) return std::vector<uint8_t>(content.begin(), content.end());
+            return says(fmt::format("answered message {:#04x} with one of type {:#04x}: reset it and start over", type,
+                                    uint16_t(reply.type)));
         }
-        if (received_.empty()) {
-            auto bytes = transfer_->read(read_bytes, reply_timeout_us);
-            if (!bytes.ok()) return bytes.error();
-            received_ = std::move(*bytes);
-            ++reads;
-        }
-        const size_t taken = ols_frame_parser_write(parser_.get(), received_.data(), received_.size());
-        received_.erase(received_.begin(), received_.begin() + ptrdiff_t(taken));
+        if (const Status more = receive(exchange); !more.ok()) return more.error();
     }
-    return fail("the board sends, but not the answer to what it was asked: reset it and start over");
 }
 
 Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {
+    Exchange exchange = begin(1);
     std::vector<uint8_t> bytes;
     const uint16_t request_id = add_request(type, payload, bytes);
-    if (const Status sent = transfer_->write(bytes, reply_timeout_us); !sent.ok()) return sent.error();
-    return wait_for_reply(type, request_id);
+    if (const Status sent = transfer_->write(bytes, reply_timeout_us, exchange.deadline); !sent.ok())
+        return sent.error();
+    return wait_for_reply(type, request_id, exchange);
 }
 
-Status Board::command(uint16_t type) {
-    const auto reply = request(type, {});
+Status Board::command(uint16_t type, std::span<const uint8_t> payload) {
+    const auto reply = request(type, payload);
     if (!reply.ok()) return reply.error();
+    if (!reply->empty()) return wrong_length(type, reply->size());
     return Done{};
 }
 
 template <typename Reply>
-Result<Reply> Board::ask(uint16_t type, std::span<const uint8_t> payload) {
-    const auto bytes = request(type, payload);
+Result<Reply> Board::ask(uint16_t type) {
+    const auto bytes = request(type, {});
     if (!bytes.ok()) return bytes.error();
-    if (bytes->size() < sizeof(Reply)) return wrong_reply();
+    if (bytes->size() != sizeof(Reply)) return wrong_length(type, bytes->size());
     Reply reply;
     std::memcpy(&reply, bytes->data(), sizeof reply);
     return reply;
@@ -203,7 +228,7 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
     begin.cycles = cycles;
     begin.program_bytes = uint32_t(program.size());
     begin.program_crc32 = ols_crc32(0, program.data(), program.size());
-    if (const auto reply = request(OLS_LOAD_BEGIN, bytes_of(begin)); !reply.ok()) return reply.error();
+    if (const Status begun = command(OLS_LOAD_BEGIN, bytes_of(begin)); !begun.ok()) return begun;
     constexpr size_t data_bytes_max = OLS_PAYLOAD_BYTES_MAX - sizeof(ols_load_chunk);
     for (size_t offset = 0; offset < program.size(); offset += data_bytes_max) {
         const ols_load_chunk chunk{uint32_t(offset)};
@@ -211,16 +236,14 @@ Status Board::load(std::span<const uint8_t> program, uint16_t slot_count, uint16
         std::vector<uint8_t> payload(sizeof chunk + data.size());
         std::memcpy(payload.data(), &chunk, sizeof chunk);
         std::copy(data.begin(), data.end(), payload.begin() + sizeof chunk);
-        if (const auto reply = request(OLS_LOAD_CHUNK, payload); !reply.ok()) return reply.error();
+        if (const Status taken = command(OLS_LOAD_CHUNK, payload); !taken.ok()) return taken;
     }
     return command(OLS_LOAD_END);
 }
 
 Status Board::arm(const Playback& playback) {
     const ols_arm arm = arm_message(playback);
-    const auto reply = request(OLS_ARM, bytes_of(arm));
-    if (!reply.ok()) return reply.error();
-    return Done{};
+    return command(OLS_ARM, bytes_of(arm));
 }
 
 Status Board::start() {
@@ -229,6 +252,13 @@ Status Board::start() {
 
 Status Board::stop() {
     return command(OLS_STOP);
+}
+
+void Board::tell_to_stop() {
+    Patience brief(last_word_ms);
+    std::vector<uint8_t> bytes;
+    add_request(OLS_STOP, {}, bytes);
+    (void)transfer_->write(bytes, reply_timeout_us, brief.begin_exchange());
 }
 
 Status Board::clear_fault() {
@@ -244,57 +274,41 @@ Result<ols_swap_reply> Board::swap() {
 }
 
 Result<ols_status_reply> Board::status() {
-    return ask<ols_status_reply>(OLS_STATUS);
-}
-
-// Appends the entries of a reply that are new: when what was asked for is gone, the replies to several requests begin alike.
-// False when its length is wrong.
-static bool append_entries(std::span<const uint8_t> reply, TriggerLog& log) {
-    ols_trigger_log_reply head;
-    if (reply.size() < sizeof head) return false;
-    std::memcpy(&head, reply.data(), sizeof head);
-    if (reply.size() != sizeof head + head.entry_count * sizeof(ols_trigger_log_entry)) return false;
-    log.next_counter = head.next_counter;
-    log.entries_lost = head.entries_lost;
-    for (size_t n = 0; n < head.entry_count; ++n) {
-        ols_trigger_log_entry entry;
-        std::memcpy(&entry, reply.data() + sizeof head + n * sizeof entry, sizeof entry);
-        if (log.entries.empty() || entry.counter > log.entries.back().counter) log.entries.push_back(entry);
-    }
-    return true;
+    auto status = ask<ols_status_reply>(OLS_STATUS);
+    if (status.ok() && status->state > OLS_STATE_WAITING)
+        return says(fmt::format("says that it is in state {}, which there is not: reset it", status->state));
+    return status;
 }
 
 Result<TriggerLog> Board::read_trigger_log(uint32_t first_counter, uint32_t known_counter) {
     const uint32_t waiting = known_counter > first_counter ? known_counter - first_counter : 0;
     const uint32_t messages = std::clamp(waiting / OLS_LOG_ENTRIES_MAX, 1u, log_messages_at_once);
+    Exchange exchange = begin(messages);
     std::vector<uint8_t> bytes;
-    std::vector<uint16_t> ids;
+    std::vector<std::pair<uint16_t, ols_read_trigger_log>> asked;
     for (uint32_t n = 0; n < messages; ++n) {
         const ols_read_trigger_log what{first_counter + n * OLS_LOG_ENTRIES_MAX, OLS_LOG_ENTRIES_MAX, 0};
-        ids.push_back(add_request(OLS_READ_TRIGGER_LOG, bytes_of(what), bytes));
+        asked.emplace_back(add_request(OLS_READ_TRIGGER_LOG, bytes_of(what), bytes), what);
     }
-    if (const Status sent = transfer_->write(bytes, reply_timeout_us); !sent.ok()) return sent.error();
+    if (const Status sent = transfer_->write(bytes, reply_timeout_us, exchange.deadline); !sent.ok())
+        return sent.error();
     TriggerLog log;
-    for (const uint16_t id : ids) {
-        const auto reply = wait_for_reply(OLS_READ_TRIGGER_LOG, id);
+    for (const auto& [id, what] : asked) {
+        const auto reply = wait_for_reply(OLS_READ_TRIGGER_LOG, id, exchange);
         if (!reply.ok()) return reply.error();
-        if (!append_entries(*reply, log)) return wrong_reply();
+        const auto more = parse_trigger_log(*reply, what);
+        if (!more.ok()) return not_sound(more.error());
+        if (const Status goes_on = append_log(log, *more); !goes_on.ok()) return not_sound(goes_on.error());
     }
     return log;
 }
 
 Result<CycleDigests> Board::read_digests(uint32_t first_digest) {
     const ols_read_digests what{first_digest, OLS_DIGESTS_MAX, 0};
-    const auto bytes = request(OLS_READ_DIGESTS, bytes_of(what));
-    if (!bytes.ok()) return bytes.error();
-    ols_digests_reply head;
-    if (bytes->size() < sizeof head) return wrong_reply();
-    std::memcpy(&head, bytes->data(), sizeof head);
-    if (bytes->size() != sizeof head + head.digest_count * sizeof(ols_cycle_digest)) return wrong_reply();
-    CycleDigests read{{}, head.first_digest, head.next_digest, head.digests_lost};
-    read.digests.resize(head.digest_count);
-    if (head.digest_count)
-        std::memcpy(read.digests.data(), bytes->data() + sizeof head, head.digest_count * sizeof(ols_cycle_digest));
+    const auto reply = request(OLS_READ_DIGESTS, bytes_of(what));
+    if (!reply.ok()) return reply.error();
+    auto read = parse_digests(*reply, what);
+    if (!read.ok()) return not_sound(read.error());
     return read;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "device/board_replies.hpp"
 #include "device/transfer.hpp"
 #include "frame.h"
 #include "stage/playback.hpp"
@@ -15,36 +16,25 @@
 
 namespace ols {
 
-// What the trigger log says of one request.
-struct TriggerLog {
-    std::vector<ols_trigger_log_entry> entries;
-    uint32_t next_counter = 0;  // that the next trigger will have
-    uint32_t entries_lost = 0;  // since start: the board's log had no room
-};
-
-// The digests of cycles that one request gave.
-struct CycleDigests {
-    std::vector<ols_cycle_digest> digests;
-    uint32_t first_digest = 0;  // number of the first of them
-    uint32_t next_digest = 0;   // number that the next one will have
-    uint32_t digests_lost = 0;  // since start: overwritten before they were read
-};
-
 // "timeline_starved: ..." with what to do, for a latched fault (enum ols_fault).
 std::string fault_text(const ols_status_reply& status);
 
 const char* state_name(uint8_t state);
 
 // One request at a time; not for use by two threads at once. Every function fails when the board is gone, does not
-// answer within a second of its own time, or refuses; a refusal carries the board's own words.
+// answer within a second of its own time, takes longer than the patience for the whole exchange, sends more than some frames
+// without the answer among them, answers with what the request has no room for, or refuses; a refusal carries the board's own
+// words. Errors name the board.
 class Board {
   public:
     // Says hello. A board of another message layout is refused: the error says to flash this release's firmware.
-    static Result<Board> connect(std::unique_ptr<Transfer> transfer);
+    static Result<Board> connect(std::unique_ptr<Transfer> transfer, const Patience& patience = Patience());
 
     // For flashing: a board of any layout is good enough. Only reboot_to_bootloader and layout_hash may be used of one
     // whose layout is another.
-    static Result<Board> connect_any_layout(std::unique_ptr<Transfer> transfer);
+    static Result<Board> connect_any_layout(std::unique_ptr<Transfer> transfer, const Patience& patience = Patience());
+    std::string name() const { return transfer_->name(); }  // for errors: "the board at 'PATH'"
+    Deadline begin_exchange() { return patience_.begin_exchange(); }
     uint64_t layout_hash() const { return info_.layout_hash; }
     bool same_layout() const;
 
@@ -60,6 +50,7 @@ class Board {
     Result<ols_swap_reply> swap();
     Status start();
     Status stop();
+    void tell_to_stop();  // one that may be heard no more: waits for no answer, and a second at most
     Status clear_fault();
     Result<ols_status_reply> status();
     Status reboot_to_bootloader();  // the board leaves; refused while a program is armed or plays
@@ -73,18 +64,31 @@ class Board {
     Result<CycleDigests> read_digests(uint32_t first_digest);
 
   private:
-    explicit Board(std::unique_ptr<Transfer> transfer);
+    // What is left for requests that are sent together, and their replies.
+    struct Exchange {
+        Deadline deadline;
+        size_t bytes_left;
+    };
 
+    Board(std::unique_ptr<Transfer> transfer, const Patience& patience);
+
+    Exchange begin(size_t requests);
     // Sends a request and waits for its reply, whose payload it returns.
     Result<std::vector<uint8_t>> request(uint16_t type, std::span<const uint8_t> payload);
     // The two halves of that: appends the request to `bytes`, and returns its id; waits for the reply to that id.
     uint16_t add_request(uint16_t type, std::span<const uint8_t> payload, std::vector<uint8_t>& bytes);
-    Result<std::vector<uint8_t>> wait_for_reply(uint16_t type, uint16_t request_id);
-    Status command(uint16_t type);
+    Result<std::vector<uint8_t>> wait_for_reply(uint16_t type, uint16_t request_id, Exchange& exchange);
+    Status receive(Exchange& exchange);
+    Status command(uint16_t type, std::span<const uint8_t> payload = {});
     template <typename Reply>
-    Result<Reply> ask(uint16_t type, std::span<const uint8_t> payload = {});
+    Result<Reply> ask(uint16_t type);
+    Error says(const std::string& what) const { return fail(name() + " " + what); }
+    Error not_sound(const Error& reply) const { return says(reply.message + "; reset it and start over"); }
+    Error refusal(std::span<const uint8_t> payload) const;
+    Error wrong_length(uint16_t type, size_t bytes) const;
 
     std::unique_ptr<Transfer> transfer_;
+    Patience patience_;
     std::unique_ptr<ols_frame_parser> parser_;
     std::vector<uint8_t> received_;  // bytes that the parser has not taken yet
     uint16_t last_request_id_ = 0;

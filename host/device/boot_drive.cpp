@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -15,8 +16,14 @@ namespace ols {
 
 namespace {
 
+// The boot ROM's file is some 60 bytes.
 bool is_boot_drive(const std::string& path) {
-    std::ifstream info(path + "/INFO_UF2.TXT");
+    const std::string name = path + "/INFO_UF2.TXT";
+    std::error_code missing;
+    if (!std::filesystem::is_regular_file(name, missing)) return false;
+    char text[1024] = {};
+    std::ifstream(name).read(text, sizeof text - 1);
+    std::istringstream info(text);
     for (std::string line; std::getline(info, line);)
         if (line.starts_with("Board-ID: RPI-RP2")) return true;
     return false;
@@ -61,7 +68,8 @@ Status write_boot_drive(const std::string& path, std::span<const uint8_t> uf2) {
         return fail("'" + path +
                     "' is not the drive of an RP2040 in BOOTSEL mode: it has no INFO_UF2.TXT that says so");
     const std::string file = path + "/stage.uf2";
-    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    // Neither waits for the other end of a pipe nor follows a link to something else.
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW, 0644);
     if (fd < 0) return write_failed(file);
     while (!uf2.empty()) {
         const ssize_t written = ::write(fd, uf2.data(), uf2.size());

@@ -44,8 +44,8 @@ struct CameraState {
     std::string why;
 };
 
-// Threads: read() from one thread at a time; stop(), watermark_ns(), counts() and state() from any, also during read();
-// the rest while nobody reads. Objects share nothing: several cameras are several objects, each with its thread.
+// Threads: read() from one thread at a time; stop(), watermark_ns(), counts() and state() from any, also during read(), stop()
+// also during a start() that waits, which then fails; the rest while nobody reads. Objects share nothing: several cameras are several objects, each with its thread.
 // Bounds: every function returns, also when the device hangs. What the device has to answer gets `device_patience_ms` and
 // fails after that; a device that shows no sign of life for so long is `gone` (a watchdog of the driver's own where its
 // library may wait for ever).

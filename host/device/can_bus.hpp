@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "device/unix_socket.hpp"
+#include "device/patience.hpp"
 #include "result.hpp"
 
 namespace ols {
@@ -18,19 +18,23 @@ class CanBus {
   public:
     virtual ~CanBus() = default;
 
-    virtual Status send(const can_frame& frame) = 0;
+    // What it is, for errors: "the CAN interface 'can0'".
+    virtual std::string name() const { return "the CAN bus"; }
 
-    // The next frame, or none when it is `until_us` before one comes.
-    virtual Result<std::optional<can_frame>> receive(uint64_t until_us) = 0;
+    virtual Status send(const can_frame& frame, const Deadline& deadline) = 0;
 
-    // Microseconds; on an emulated bus the board's, which is not the wall's.
+    // The next frame, of 8 bytes at most, or none when it is `until_us` before one comes, or when a while has passed on the
+    // wall's clock, whose time the caller then looks at.
+    virtual Result<std::optional<can_frame>> receive(uint64_t until_us, const Deadline& deadline) = 0;
+
+    // Microseconds, never going back; on an emulated bus the board's, which is not the wall's.
     virtual uint64_t now_us() const = 0;
 };
 
 // A SocketCAN interface, as in `ip link`: "can0". Only frames with `id` are received.
 Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id);
 
-// The emulated bus (docs/architecture.md, "CAN frames over a socket"), given up after so long without a word.
-Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, int patience_ms = UnixSocket::patience_ms);
+// The emulated bus (docs/architecture.md, "CAN frames over a socket").
+Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, const Deadline& deadline);
 
 }  // namespace ols

@@ -13,6 +13,6 @@ namespace ols {
 std::unique_ptr<Transfer> can_transfer(std::unique_ptr<CanBus> bus, unsigned board_number);
 
 // "can:IFACE" or "can-socket:PATH", with "#N" behind it for another board than number 0.
-Result<std::unique_ptr<Transfer>> open_can(const std::string& link);
+Result<std::unique_ptr<Transfer>> open_can(const std::string& link, const Deadline& deadline);
 
 }  // namespace ols

@@ -4,9 +4,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "image_label.h"
 
@@ -49,6 +50,10 @@ std::string text_of(const char* text, size_t bytes) {
     return std::string(text, strnlen(text, bytes));
 }
 
+bool is_printable(const std::string& text) {
+    return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
+}
+
 }  // namespace
 
 std::optional<ImageLabel> parse_label(std::span<const uint8_t> bytes) {
@@ -58,7 +63,7 @@ std::optional<ImageLabel> parse_label(std::span<const uint8_t> bytes) {
     if (label.magic != OLS_IMAGE_LABEL_MAGIC || label.label_bytes < sizeof label) return {};
     ImageLabel found{text_of(label.board, sizeof label.board),
                      text_of(label.firmware_version, sizeof label.firmware_version), label.layout_hash};
-    if (found.board.empty()) return {};
+    if (found.board.empty() || !is_printable(found.board) || !is_printable(found.version)) return {};
     return found;
 }
 
@@ -103,9 +108,15 @@ Result<FirmwareImage> parse_uf2(std::span<const uint8_t> file, const std::string
 }
 
 Result<FirmwareImage> read_uf2(const std::string& path) {
+    std::error_code missing;
+    if (!std::filesystem::is_regular_file(path, missing))
+        return fail("cannot read '" + path + "': it is no file: check the path, or build it: make firmware");
     std::ifstream file(path, std::ios::binary);
     if (!file) return fail("cannot read '" + path + "': check the path, or build it: make firmware");
-    const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+    // One block more than any image has, so that a longer file is seen to be too long.
+    std::vector<char> bytes((image_bytes_max / flash_page_bytes + 1) * sizeof(Uf2Block));
+    file.read(bytes.data(), std::streamsize(bytes.size()));
+    bytes.resize(size_t(file.gcount()));
     return parse_uf2({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}, path);
 }
 

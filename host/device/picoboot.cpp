@@ -69,6 +69,10 @@ const char* status_name(uint32_t code) {
     return code < std::size(names) ? names[code] : "an unknown status";
 }
 
+Error cut_short(uint8_t id) {
+    return fail(fmt::format("the boot loader took only a part of {}: start over", command_name(id)));
+}
+
 std::span<const uint8_t> bytes_of(const CommandPacket& packet) {
     return {reinterpret_cast<const uint8_t*>(&packet), sizeof packet};
 }
@@ -80,8 +84,11 @@ Error Picoboot::refusal(uint8_t id, UsbOutcome outcome) {
     const std::span<uint8_t> bytes(reinterpret_cast<uint8_t*>(&status), sizeof status);
     if (outcome == UsbOutcome::stalled) {
         const UsbResult got = device_->control(from_interface, get_command_status, bytes, timeout_ms);
-        if (got.outcome == UsbOutcome::done && got.bytes == sizeof status)
-            return fail(fmt::format("the boot loader refused {}: {}", command_name(id), status_name(status.code)));
+        if (got.outcome == UsbOutcome::done && got.bytes == sizeof status) {
+            const bool is_of_this = status.token == token_ && status.id == id;
+            return fail(fmt::format("the boot loader refused {}: {}",
+                                    is_of_this ? command_name(id) : "an earlier command", status_name(status.code)));
+        }
     }
     return fail(fmt::format("{} failed: {}", command_name(id), usb_outcome_text(outcome)));
 }
@@ -95,6 +102,7 @@ Status Picoboot::send_command(uint8_t id, const Arguments& arguments, uint32_t t
     std::memcpy(packet.arguments, arguments.words, sizeof packet.arguments);
     const UsbResult sent = device_->write(bytes_of(packet), timeout_ms);
     if (sent.outcome != UsbOutcome::done) return refusal(id, sent.outcome);
+    if (sent.bytes != sizeof packet) return cut_short(id);
     return Done{};
 }
 
@@ -103,6 +111,9 @@ Status Picoboot::acknowledge(uint8_t id) {
     const UsbResult result =
         id & 0x80 ? device_->write({}, timeout_ms) : device_->read(std::span<uint8_t>(nothing), timeout_ms);
     if (result.outcome != UsbOutcome::done) return refusal(id, result.outcome);
+    if (result.bytes != 0)
+        return fail(fmt::format("the boot loader acknowledged {} with {} bytes, and it should be with none: start over",
+                                command_name(id), result.bytes));
     return Done{};
 }
 
@@ -131,8 +142,9 @@ Status Picoboot::erase(uint32_t address, uint32_t byte_count) {
 Status Picoboot::write(uint32_t address, std::span<const uint8_t> bytes) {
     const uint32_t byte_count = uint32_t(bytes.size());
     if (Status sent = send_command(command_write, {{address, byte_count}, 8}, byte_count); !sent.ok()) return sent;
-    if (const UsbResult sent = device_->write(bytes, timeout_ms); sent.outcome != UsbOutcome::done)
-        return refusal(command_write, sent.outcome);
+    const UsbResult sent = device_->write(bytes, timeout_ms);
+    if (sent.outcome != UsbOutcome::done) return refusal(command_write, sent.outcome);
+    if (sent.bytes != byte_count) return cut_short(command_write);
     return acknowledge(command_write);
 }
 

@@ -3,6 +3,7 @@
 #include "device/ring.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <linux/futex.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -13,14 +14,18 @@
 #include <cerrno>
 #include <chrono>
 #include <climits>
+#include <cmath>
 #include <cstring>
 #include <ctime>
 
+#include "device/guarded_mapping.hpp"
 #include "image/whole_file.hpp"
 
 namespace ols {
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 void futex_wait(std::atomic<uint32_t>& word, uint32_t seen, int timeout_ms) {
     const timespec timeout{timeout_ms / 1000, long(timeout_ms % 1000) * 1000000};
@@ -55,18 +60,57 @@ bool is_taken(int fd, End end) {
     return fcntl(fd, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
+// Whether a frame's samples can be where its RingFrame says.
+bool is_sound(const RingFrame& frame, const RingLayout& layout) {
+    const RingContent& content = layout.content;
+    const uint64_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+    const uint64_t row_bytes = frame.width * uint64_t(samples_per_pixel(frame.cfa)) * sample_bytes;
+    return frame.format == content.format && frame.cfa == content.cfa && frame.width <= content.width &&
+           frame.height <= content.height && frame.pitch_bytes >= row_bytes && frame.pitch_bytes % sample_bytes == 0 &&
+           uint64_t(frame.pitch_bytes) * frame.height <= frame.bytes &&
+           frame.bytes <= layout.stride - sizeof(RingFrame) && std::isfinite(frame.black) &&
+           std::isfinite(frame.white) && frame.black < frame.white;
+}
+
 }  // namespace
 
+// A ring that another release has made, or somebody else.
+std::string ring_defect(const RingLayout& layout, uint64_t file_bytes) {
+    const RingContent& content = layout.content;
+    if (layout.magic != ring_magic) return "it does not begin as one of this version does";
+    if (layout.slots == 0 || layout.slots > ring_slots_max)
+        return fmt::format("it says that it has {} slots, and 1 to {} can be", layout.slots, ring_slots_max);
+    if (content.width == 0 || content.width > ring_size_max || content.height == 0 || content.height > ring_size_max)
+        return fmt::format("its frames are {} x {} pixels, and 1 to {} a side can be", content.width, content.height,
+                           ring_size_max);
+    if (content.format != PixelFormat::u16 && content.format != PixelFormat::f32)
+        return fmt::format("it says that its samples are of format {}", uint32_t(content.format));
+    if (content.cfa > Cfa::rgb) return fmt::format("it says that its colour filter is {}", uint32_t(content.cfa));
+    if (content.format == PixelFormat::u16 && (content.bits == 0 || content.bits > 16))
+        return fmt::format("it says that its samples have {} bits", content.bits);
+    const uint64_t least = sizeof(RingFrame) + content.frame_bytes();
+    if (layout.stride % 64 != 0 || layout.stride < least || layout.stride > 2 * least + 4096)
+        return fmt::format("its records are {} bytes, and a frame of {} x {} pixels takes {}", layout.stride,
+                           content.width, content.height, least);
+    const uint64_t bytes = sizeof(RingHeader) + uint64_t(layout.slots) * layout.stride;
+    if (bytes > file_bytes)
+        return fmt::format("its {} slots of {} bytes take {} bytes, and the file has {}", layout.slots, layout.stride,
+                           bytes, file_bytes);
+    return "";
+}
+
+// An end's own: the layout is not read from the shared memory again.
 struct RingMapping {
-    RingHeader* header = nullptr;
-    size_t bytes = 0;
+    GuardedMapping memory;
+    RingLayout layout;
     int fd = -1;
 
+    RingHeader& header() const { return *reinterpret_cast<RingHeader*>(memory.data()); }
     std::byte* record(uint64_t n) const {
-        return reinterpret_cast<std::byte*>(header) + sizeof(RingHeader) + size_t(n % header->slots) * header->stride;
+        return memory.data() + sizeof(RingHeader) + size_t(n % layout.slots) * layout.stride;
     }
     ~RingMapping() {
-        if (header) munmap(header, bytes);
+        memory = {};
         if (fd >= 0) ::close(fd);
     }
 };
@@ -83,7 +127,10 @@ Result<RingWriter> RingWriter::create(const std::string& path, uint32_t slots, c
     if (slots == 0 || stride > UINT32_MAX)
         return fail("ring '" + path + "': needs at least one slot of less than 4 GiB");
     auto mapping = std::make_unique<RingMapping>();
-    mapping->bytes = sizeof(RingHeader) + slots * stride;
+    mapping->layout.slots = slots;
+    mapping->layout.stride = uint32_t(stride);
+    mapping->layout.content = content;
+    const uint64_t bytes = sizeof(RingHeader) + slots * stride;
 
     // A reader never sees a half-made header.
     const Status made = write_whole_file(path, [&](const std::string& temporary) -> Status {
@@ -92,17 +139,12 @@ Result<RingWriter> RingWriter::create(const std::string& path, uint32_t slots, c
             return fail("cannot make ring '" + path + "': " + std::strerror(errno));
         if (!take_place(mapping->fd, End::writer))
             return fail("cannot lock ring '" + path + "': " + std::strerror(errno) + "; choose a local file system");
-        void* memory = MAP_FAILED;
-        if (posix_fallocate(mapping->fd, 0, off_t(mapping->bytes)) == 0)
-            memory = mmap(nullptr, mapping->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, mapping->fd, 0);
-        if (memory == MAP_FAILED)
-            return fail("cannot reserve " + std::to_string(mapping->bytes >> 20) + " MiB for ring '" + path +
+        if (posix_fallocate(mapping->fd, 0, off_t(bytes)) == 0) mapping->memory = GuardedMapping(mapping->fd, bytes);
+        if (!mapping->memory.data())
+            return fail("cannot reserve " + std::to_string(bytes >> 20) + " MiB for ring '" + path +
                         "': free space there or choose fewer slots");
-        mapping->header = new (memory) RingHeader{};
-        mapping->header->magic = ring_magic;
-        mapping->header->slots = slots;
-        mapping->header->stride = uint32_t(stride);
-        mapping->header->content = content;
+        new (mapping->memory.data()) RingHeader{};
+        mapping->header().layout = mapping->layout;
         return Done{};
     });
     if (!made) return made.error();
@@ -110,7 +152,7 @@ Result<RingWriter> RingWriter::create(const std::string& path, uint32_t slots, c
 }
 
 std::optional<uint32_t> RingWriter::start_asked() const {
-    const RingHeader& header = *mapping_->header;
+    const RingHeader& header = mapping_->header();
     const uint32_t asked = header.asked.load(std::memory_order_acquire);
     const bool is_open = header.running.load(std::memory_order_acquire) &&
                          asked != header.started.load(std::memory_order_relaxed) && is_taken(mapping_->fd, End::reader);
@@ -118,7 +160,7 @@ std::optional<uint32_t> RingWriter::start_asked() const {
 }
 
 void RingWriter::confirm_start(uint32_t start, uint64_t camera_time_ns) {
-    RingHeader& header = *mapping_->header;
+    RingHeader& header = mapping_->header();
     header.started_ns.store(camera_time_ns, std::memory_order_relaxed);
     header.started_head.store(header.head.load(std::memory_order_relaxed), std::memory_order_relaxed);
     header.started.store(start, std::memory_order_release);
@@ -126,20 +168,20 @@ void RingWriter::confirm_start(uint32_t start, uint64_t camera_time_ns) {
 }
 
 bool RingWriter::wanted() const {
-    const RingHeader& header = *mapping_->header;
+    const RingHeader& header = mapping_->header();
     return header.running.load(std::memory_order_acquire) &&
            header.asked.load(std::memory_order_acquire) == header.started.load(std::memory_order_relaxed) &&
            is_taken(mapping_->fd, End::reader);
 }
 
 RingWriter::Outcome RingWriter::write(const Frame& frame, bool wait, const std::atomic<bool>& cancelled) {
-    RingHeader& header = *mapping_->header;
+    RingHeader& header = mapping_->header();
     const uint64_t head = header.head.load(std::memory_order_relaxed);
-    assert(sizeof(RingFrame) + frame.samples.size() <= header.stride);
+    assert(sizeof(RingFrame) + frame.samples.size() <= mapping_->layout.stride);
     for (;;) {
         const uint32_t seen = header.tail_futex.load(std::memory_order_acquire);
         if (!wanted()) return Outcome::unwanted;
-        if (head - header.tail.load(std::memory_order_acquire) < header.slots) break;
+        if (head - header.tail.load(std::memory_order_acquire) < mapping_->layout.slots) break;
         if (!wait) {
             header.dropped.fetch_add(1, std::memory_order_relaxed);
             return Outcome::full;
@@ -159,98 +201,154 @@ RingWriter::Outcome RingWriter::write(const Frame& frame, bool wait, const std::
 }
 
 void RingWriter::set_watermark(uint64_t camera_time_ns) {
-    mapping_->header->watermark_ns.store(camera_time_ns, std::memory_order_release);
-    futex_wake(mapping_->header->head_futex);
+    mapping_->header().watermark_ns.store(camera_time_ns, std::memory_order_release);
+    futex_wake(mapping_->header().head_futex);
 }
 
 void RingWriter::close() {
-    mapping_->header->closed.store(1, std::memory_order_release);
-    futex_wake(mapping_->header->head_futex);
+    mapping_->header().closed.store(1, std::memory_order_release);
+    futex_wake(mapping_->header().head_futex);
 }
 
-RingReader::RingReader(std::unique_ptr<RingMapping> mapping) : mapping_(std::move(mapping)) {}
+// What the reader keeps to itself.
+struct RingReader::State {
+    // Seen by an access, or by the file's size where nothing has been accessed since.
+    bool is_cut() const {
+        struct stat info {};
+        return mapping.memory.cut() || fstat(mapping.fd, &info) != 0 || size_t(info.st_size) < mapping.memory.size();
+    }
+
+    RingMapping mapping;
+    std::atomic<uint64_t> tail = 0;
+    std::atomic<bool> wanted = false;   // from a start, answered or not, to the stop
+    std::atomic<bool> running = false;  // from the answer to a start to the stop
+    std::atomic<bool> closed = false;   // the writer has said so once
+    std::atomic<const char*> problem = nullptr;
+};
+
+RingReader::RingReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
 RingReader::RingReader(RingReader&&) noexcept = default;
 RingReader& RingReader::operator=(RingReader&&) noexcept = default;
 RingReader::~RingReader() {
-    if (mapping_) stop();
+    if (state_) stop();
 }
 
 Result<RingReader> RingReader::open(const std::string& path) {
-    auto mapping = std::make_unique<RingMapping>();
-    mapping->fd = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-    if (mapping->fd < 0)
+    auto state = std::make_unique<State>();
+    RingMapping& mapping = state->mapping;
+    // Not to wait for the other end of a pipe.
+    mapping.fd = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NONBLOCK);
+    if (mapping.fd < 0)
         return fail("cannot open camera ring '" + path + "': " + std::strerror(errno) + "; start the camera first");
+    const auto no_ring = [&](const std::string& why) {
+        return fail("'" + path + "' is no camera ring: " + why + "; restart the camera program of this release");
+    };
     struct stat info {};
-    fstat(mapping->fd, &info);
-    mapping->bytes = size_t(info.st_size);
-    void* memory = mapping->bytes >= sizeof(RingHeader)
-                       ? mmap(nullptr, mapping->bytes, PROT_READ | PROT_WRITE, MAP_SHARED, mapping->fd, 0)
-                       : MAP_FAILED;
-    if (memory == MAP_FAILED) return fail("'" + path + "' is no camera ring: it is too small");
-    mapping->header = static_cast<RingHeader*>(memory);
-    RingHeader& header = *mapping->header;
-    if (header.magic != ring_magic || header.slots == 0 || header.stride < sizeof(RingFrame) ||
-        sizeof(RingHeader) + uint64_t(header.slots) * header.stride > mapping->bytes)
-        return fail("'" + path + "' is no camera ring of this version: restart the camera program of this release");
-    if (!take_place(mapping->fd, End::reader))
+    if (fstat(mapping.fd, &info) != 0 || !S_ISREG(info.st_mode)) return no_ring("it is no file");
+    if (pread(mapping.fd, &mapping.layout, sizeof mapping.layout, 0) != ssize_t(sizeof mapping.layout) ||
+        size_t(info.st_size) < sizeof(RingHeader))
+        return no_ring("it is too small");
+    if (const std::string defect = ring_defect(mapping.layout, uint64_t(info.st_size)); !defect.empty())
+        return no_ring(defect);
+    mapping.memory =
+        GuardedMapping(mapping.fd, sizeof(RingHeader) + size_t(mapping.layout.slots) * mapping.layout.stride);
+    if (!mapping.memory.data()) return no_ring(std::string("it cannot be mapped: ") + std::strerror(errno));
+    if (!take_place(mapping.fd, End::reader))
         return fail("the camera at '" + path + "' is busy: another program reads it; end that one first");
-    if (header.closed.load(std::memory_order_acquire) || !is_taken(mapping->fd, End::writer))
+    RingHeader& header = mapping.header();
+    if (header.closed.load(std::memory_order_acquire) || !is_taken(mapping.fd, End::writer))
         return fail("nothing fills the camera ring '" + path + "' any more: start the camera again");
     header.running.store(0, std::memory_order_release);  // a reader that was killed left it as it was
-    return RingReader(std::move(mapping));
+    return RingReader(std::move(state));
 }
 
 const RingContent& RingReader::content() const {
-    return mapping_->header->content;
+    return state_->mapping.layout.content;
 }
 
 uint32_t RingReader::slots() const {
-    return mapping_->header->slots;
+    return state_->mapping.layout.slots;
 }
 
 Result<uint64_t> RingReader::start(int patience_ms) {
-    using Clock = std::chrono::steady_clock;
-    RingHeader& header = *mapping_->header;
+    RingHeader& header = state_->mapping.header();
+    state_->running = false;
+    state_->wanted = true;
     header.running.store(0, std::memory_order_release);
     const uint32_t start = header.asked.load(std::memory_order_relaxed) + 1;
+    const uint32_t answered_before = header.started.load(std::memory_order_acquire);
     header.asked.store(start, std::memory_order_release);
     header.running.store(1, std::memory_order_release);
     // A writer that waits for room sees that what it waits with is not wanted any more. Room is made when it has answered: what
     // it writes after that is not to be let go of.
     futex_wake(header.tail_futex);
     const auto until = Clock::now() + std::chrono::milliseconds(patience_ms);
-    while (header.started.load(std::memory_order_acquire) != start) {
+    for (;;) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
-        if (header.started.load(std::memory_order_acquire) == start) break;
-        if (header.running.load(std::memory_order_acquire) == 0) return fail("the camera was stopped while it started");
-        if (writer() != Writer::live)
+        if (!state_->wanted) return fail("the camera was stopped while it started");
+        const uint32_t answered = header.started.load(std::memory_order_acquire);
+        if (answered == start) break;
+        // An answer to an earlier start may come late.
+        if (start - answered > start - answered_before) state_->problem = "it answers a start that was not asked for";
+        const Writer now = writer();
+        if (now == Writer::broken)
+            return fail("the camera's ring is broken, " + problem() + ": start the program that fills it again");
+        if (now != Writer::live)
             return fail("the camera is gone: the program that fills its ring has ended; start it again");
         if (Clock::now() > until)
             return fail(
                 "the camera does not start: the program that fills its ring gives no answer; start that one again");
         futex_wait(header.head_futex, seen, 100);
     }
-    header.tail.store(header.started_head.load(std::memory_order_relaxed), std::memory_order_release);
+    state_->tail = header.started_head.load(std::memory_order_relaxed);
+    (void)frames_waiting();
+    if (state_->problem)
+        return fail("the camera's ring is broken, " + problem() + ": start the program that fills it again");
+    header.tail.store(state_->tail, std::memory_order_release);
+    state_->running = true;
+    if (!state_->wanted) stop();  // it came meanwhile
     futex_wake(header.tail_futex);
     return header.started_ns.load(std::memory_order_relaxed);
 }
 
 void RingReader::stop() {
-    mapping_->header->running.store(0, std::memory_order_release);
-    futex_wake(mapping_->header->tail_futex);
+    state_->wanted = state_->running = false;
+    state_->mapping.header().running.store(0, std::memory_order_release);
+    futex_wake(state_->mapping.header().tail_futex);
+}
+
+// Frames between the reader's count and the writer's, which can be as many as there are slots. For the thread that reads: to
+// another one the counts are of two moments.
+uint64_t RingReader::frames_waiting() const {
+    const RingMapping& mapping = state_->mapping;
+    const uint64_t waiting = mapping.header().head.load(std::memory_order_acquire) - state_->tail;
+    if (mapping.memory.cut())
+        state_->problem = "its file was cut short";
+    else if (waiting > mapping.layout.slots)
+        state_->problem = "its count of frames jumped";
+    return state_->problem ? 0 : waiting;
 }
 
 std::optional<Frame> RingReader::read(int timeout_ms) {
-    RingHeader& header = *mapping_->header;
-    if (!header.running.load(std::memory_order_acquire)) return std::nullopt;
-    const uint64_t tail = header.tail.load(std::memory_order_relaxed);
-    const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
-    if (header.head.load(std::memory_order_acquire) == tail) {
-        if (header.closed.load(std::memory_order_acquire)) return std::nullopt;
-        futex_wait(header.head_futex, seen, timeout_ms);
-        if (header.head.load(std::memory_order_acquire) == tail) return std::nullopt;
+    RingHeader& header = state_->mapping.header();
+    const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
+    while (state_->running && !state_->problem) {
+        const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
+        if (frames_waiting() > 0) {
+            Frame frame = take_frame();
+            if (state_->mapping.memory.cut()) return std::nullopt;
+            return frame;
+        }
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
+        if (left <= 0 || header.closed.load(std::memory_order_acquire)) return std::nullopt;
+        futex_wait(header.head_futex, seen, int(left));
     }
-    const std::byte* record = mapping_->record(tail);
+    return std::nullopt;
+}
+
+Frame RingReader::take_frame() {
+    const RingMapping& mapping = state_->mapping;
+    const std::byte* record = mapping.record(state_->tail);
     RingFrame meta;
     std::memcpy(&meta, record, sizeof meta);
     Frame frame;
@@ -263,34 +361,40 @@ std::optional<Frame> RingReader::read(int timeout_ms) {
     frame.pitch_bytes = meta.pitch_bytes;
     frame.black = meta.black;
     frame.white = meta.white;
-    const size_t bytes = std::min<size_t>(meta.bytes, header.stride - sizeof meta);
-    frame.samples.assign(record + sizeof meta, record + sizeof meta + bytes);
-    header.tail.store(tail + 1, std::memory_order_release);
-    futex_wake(header.tail_futex);
+    if (is_sound(meta, mapping.layout)) {
+        const std::byte* samples = record + sizeof meta;
+        frame.samples.assign(samples, samples + size_t(meta.pitch_bytes) * meta.height);
+    }
+    ++state_->tail;
+    mapping.header().tail.store(state_->tail, std::memory_order_release);
+    futex_wake(mapping.header().tail_futex);
     return frame;
 }
 
 uint64_t RingReader::watermark_ns() const {
-    return mapping_->header->watermark_ns.load(std::memory_order_acquire);
+    return state_->mapping.header().watermark_ns.load(std::memory_order_acquire);
 }
 
 uint64_t RingReader::dropped() const {
-    return mapping_->header->dropped.load(std::memory_order_relaxed);
-}
-
-bool RingReader::has_frames() const {
-    const RingHeader& header = *mapping_->header;
-    return header.running.load(std::memory_order_acquire) &&
-           header.asked.load(std::memory_order_acquire) == header.started.load(std::memory_order_acquire) &&
-           header.head.load(std::memory_order_acquire) != header.tail.load(std::memory_order_acquire);
+    return state_->mapping.header().dropped.load(std::memory_order_relaxed);
 }
 
 RingReader::Writer RingReader::writer() const {
     // Both before the look into the ring: what was written before the end is seen in it.
-    const bool closed = mapping_->header->closed.load(std::memory_order_acquire) != 0;
-    const bool lives = is_taken(mapping_->fd, End::writer);
-    if ((lives && !closed) || has_frames()) return Writer::live;
-    return mapping_->header->closed.load(std::memory_order_acquire) ? Writer::closed : Writer::gone;
+    if (state_->mapping.header().closed.load(std::memory_order_acquire)) state_->closed = true;
+    const bool closed = state_->closed, lives = is_taken(state_->mapping.fd, End::writer);
+    const bool has_frames =
+        state_->running && state_->mapping.header().head.load(std::memory_order_acquire) != state_->tail;
+    if (state_->is_cut()) state_->problem = "its file was cut short";
+    if (state_->problem) return Writer::broken;
+    if ((lives && !closed) || has_frames) return Writer::live;
+    return state_->closed || state_->mapping.header().closed.load(std::memory_order_acquire) ? Writer::closed
+                                                                                             : Writer::gone;
+}
+
+std::string RingReader::problem() const {
+    const char* const problem = state_->problem;
+    return problem ? problem : "";
 }
 
 }  // namespace ols

@@ -6,6 +6,10 @@
 // lies at n % slots. The writer waits while head - tail == slots (--pace virtual) or drops the frame and counts it
 // (--pace wall).
 //
+// Neither end believes the other: what says where records lie (slots, stride, content) is read once, checked and kept; each end
+// keeps the count that is its own; the other's must stay within the slots from it; a file that is cut short while it is mapped
+// ends the ring. A frame that is not as the header says comes without samples.
+//
 // Each end holds a lock on a byte of the file for as long as its process lives, so that the other knows when it has gone,
 // however it went. Frames are for a reader that has started the camera: it asks for a start, the writer answers with the
 // camera's time, and until then nothing goes in.
@@ -38,11 +42,16 @@ struct RingContent {
     }
 };
 
-struct RingHeader {
-    uint64_t magic;
-    uint32_t slots;   // records
-    uint32_t stride;  // bytes a record, RingFrame included, rounded up to 64
+// What says where everything lies; written once, before there is a file of that name.
+struct RingLayout {
+    uint64_t magic = ring_magic;
+    uint32_t slots = 0;   // records
+    uint32_t stride = 0;  // bytes a record, RingFrame included, rounded up to 64
     RingContent content;
+};
+
+struct RingHeader {
+    RingLayout layout;
     // The writer's.
     alignas(64) std::atomic<uint64_t> head;
     std::atomic<uint64_t> watermark_ns;  // camera time before which every frame was written
@@ -68,6 +77,11 @@ struct RingFrame {
     float black, white;
     uint64_t bytes;  // samples that follow
 };
+
+constexpr uint32_t ring_slots_max = 1 << 16, ring_size_max = 1 << 14;  // records; pixels a side
+
+// What is wrong with the layout of a ring in a file of `file_bytes`; empty when nothing is.
+std::string ring_defect(const RingLayout& layout, uint64_t file_bytes);
 
 struct RingMapping;
 
@@ -109,10 +123,10 @@ class RingWriter {
 class RingReader {
   public:
     // Opens an existing ring, as its only reader; the error says to start the camera first when the file is not there or its
-    // writer is not, or that another program reads it.
+    // writer is not, that another program reads it, or what makes it no ring.
     static Result<RingReader> open(const std::string& path);
 
-    const RingContent& content() const;
+    const RingContent& content() const;  // as it was when the ring was opened
     uint32_t slots() const;
 
     // Has the camera started; what lies in the ring from before is let go of. Returns the camera's time. Fails when the
@@ -121,23 +135,28 @@ class RingReader {
     void stop();
 
     // The next frame, copied out, or nothing when none came within `timeout_ms` (a pause for the caller to look at
-    // its stop flag; nothing else is decided by it).
+    // its stop flag; nothing else is decided by it). One that is larger than the header's content, of another format, or whose
+    // rows are not in its bytes comes without samples.
     std::optional<Frame> read(int timeout_ms);
     uint64_t watermark_ns() const;
     uint64_t dropped() const;
 
-    enum class Writer { live, closed, gone };
-    // `live` also while frames are to be read; `gone` when its process ended without closing the ring.
+    enum class Writer { live, closed, gone, broken };
+    // `live` also while frames are to be read; `gone` when its process ended without closing the ring; `broken`: what is in the
+    // ring cannot be, problem() says what. After any but `live` nothing more is read.
     Writer writer() const;
+    std::string problem() const;  // "its counts jumped"
 
     RingReader(RingReader&&) noexcept;
     RingReader& operator=(RingReader&&) noexcept;
     ~RingReader();
 
   private:
-    explicit RingReader(std::unique_ptr<RingMapping>);
-    bool has_frames() const;  // to be read
-    std::unique_ptr<RingMapping> mapping_;
+    struct State;
+    explicit RingReader(std::unique_ptr<State>);
+    uint64_t frames_waiting() const;
+    Frame take_frame();
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace ols

@@ -66,6 +66,9 @@ class RingCamera : public Camera {
             case RingReader::Writer::live: return {};
             case RingReader::Writer::closed:
                 return {CameraState::ended, "the program that fills " + path_ + " has ended"};
+            case RingReader::Writer::broken:
+                return {CameraState::gone, "the camera is gone: the ring " + path_ + " is broken, " + ring_.problem() +
+                                               ": start the program that fills it again"};
             case RingReader::Writer::gone: break;
         }
         return {CameraState::gone,

@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -24,31 +25,33 @@ class SocketCan : public CanBus {
     SocketCan(int fd, std::string interface) : fd_(fd), interface_(std::move(interface)) {}
     ~SocketCan() override { ::close(fd_); }
 
-    Status send(const can_frame& frame) override {
+    std::string name() const override { return "the CAN interface '" + interface_ + "'"; }
+
+    Status send(const can_frame& frame, const Deadline& deadline) override {
         for (const uint64_t begin_us = now_us();;) {
             if (::write(fd_, &frame, sizeof frame) == ssize_t(sizeof frame)) return Done{};
             if (errno == EINTR) continue;
             // A full queue is not an error that poll() could wait for: the kernel drops instead (can.rst, 4.1.7).
             if (errno != ENOBUFS) return lost();
-            if (now_us() - begin_us > queue_timeout_us)
+            if (now_us() - begin_us > queue_timeout_us || deadline.left_ms() == 0)
                 return fail("the CAN bus '" + interface_ +
                             "' takes no frames: is the board on, the bus terminated, the bit rate the board's?");
             ::usleep(queue_retry_us);
         }
     }
 
-    Result<std::optional<can_frame>> receive(uint64_t until_us) override {
-        for (;;) {
-            const uint64_t now = now_us();
-            pollfd ready{fd_, POLLIN, 0};
-            const int wait_ms = until_us <= now ? 0 : int(std::min<uint64_t>((until_us - now + 999) / 1000, 1000));
-            if (::poll(&ready, 1, wait_ms) < 0 && errno != EINTR) return lost();
-            can_frame frame{};
-            const ssize_t got = ::recv(fd_, &frame, sizeof frame, MSG_DONTWAIT);
-            if (got == ssize_t(sizeof frame)) return std::optional(frame);
-            if (got < 0 && errno != EAGAIN && errno != EINTR) return lost();
-            if (now_us() >= until_us) return std::optional<can_frame>();
-        }
+    Result<std::optional<can_frame>> receive(uint64_t until_us, const Deadline& deadline) override {
+        const uint64_t now = now_us();
+        const uint64_t left_ms = until_us <= now ? 0 : (until_us - now + 999) / 1000;
+        pollfd ready{fd_, POLLIN, 0};
+        if (::poll(&ready, 1, int(std::min<uint64_t>(left_ms, uint64_t(deadline.next_wait_ms())))) < 0 &&
+            errno != EINTR)
+            return lost();
+        can_frame frame{};
+        const ssize_t got = ::recv(fd_, &frame, sizeof frame, MSG_DONTWAIT);
+        if (got == ssize_t(sizeof frame) && frame.can_dlc <= sizeof frame.data) return std::optional(frame);
+        if (got < 0 && errno != EAGAIN && errno != EINTR) return lost();
+        return std::optional<can_frame>();
     }
 
     uint64_t now_us() const override {

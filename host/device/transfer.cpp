@@ -19,11 +19,11 @@ Result<std::unique_ptr<Transfer>> open_usb_link(const std::string& serial) {
 
 }  // namespace
 
-Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link) {
+Result<std::unique_ptr<Transfer>> open_transfer(const std::string& link, const Deadline& deadline) {
     constexpr std::string_view socket_scheme = "socket:", usb_scheme = "usb:";
-    if (link.starts_with(socket_scheme)) return open_socket_transfer(link.substr(socket_scheme.size()));
+    if (link.starts_with(socket_scheme)) return open_socket_transfer(link.substr(socket_scheme.size()), deadline);
     if (link.starts_with(usb_scheme)) return open_usb_link(link.substr(usb_scheme.size()));
-    if (link.starts_with("can:") || link.starts_with("can-socket:")) return open_can(link);
+    if (link.starts_with("can:") || link.starts_with("can-socket:")) return open_can(link, deadline);
     return fail("'" + link + "' is no board link: write usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH");
 }
 

@@ -1,39 +1,38 @@
 // SPDX-License-Identifier: MIT
-// A Unix socket of the emulated board: connecting, and whole records, each within a bound of time.
+// A Unix socket of the emulated board: connecting, and whole records, until a deadline.
 #pragma once
 
 #include <cstddef>
 #include <string>
 
+#include "device/patience.hpp"
 #include "result.hpp"
 
 namespace ols {
 
 class UnixSocket {
   public:
-    // Time of the wall without one byte after which the other end is given up. An emulated board has its own time, which stands
-    // still while it is stopped, and a machine may be busy: only a board that hangs is silent for so long.
-    static constexpr int patience_ms = 60'000;
-
     // A connected stream socket. `what` listens at `path`; errors name both, and say to start the stage first.
-    static Result<UnixSocket> connect(const std::string& path, const std::string& what, int patience_ms);
+    static Result<UnixSocket> connect(const std::string& path, const std::string& what, const Deadline& deadline);
 
-    // Sends or receives all `count` bytes. Errors: the other end has gone, or is silent.
-    Status send(const void* bytes, size_t count);
-    Status receive(void* bytes, size_t count);
+    // Sends or receives all `count` bytes. Errors: the other end has gone, or the deadline is over.
+    Status send(const void* bytes, size_t count, const Deadline& deadline);
+    Status receive(void* bytes, size_t count, const Deadline& deadline);
+
+    const std::string& name() const { return name_; }  // "the board at 'PATH'"
 
     UnixSocket(UnixSocket&& other) noexcept;
     UnixSocket& operator=(UnixSocket&&) = delete;
     ~UnixSocket();
 
   private:
-    UnixSocket(int fd, std::string name, int patience_ms)
-        : fd_(fd), name_(std::move(name)), patience_ms_(patience_ms) {}
-    Error failure(ssize_t result) const;
+    UnixSocket(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+    Status wait(short events, const Deadline& deadline) const;
+    Error too_slow(const Deadline& deadline) const;
+    Error gone() const;
 
     int fd_;
-    std::string name_;  // "the board at 'PATH'"
-    int patience_ms_;
+    std::string name_;
 };
 
 }  // namespace ols

@@ -12,31 +12,47 @@ namespace {
 
 class UsbTransfer : public Transfer {
   public:
-    explicit UsbTransfer(std::unique_ptr<UsbDevice> device) : device_(std::move(device)) {}
+    UsbTransfer(std::unique_ptr<UsbDevice> device, const std::string& serial)
+        : device_(std::move(device)), name_("the board usb:" + serial) {}
 
-    Status write(std::span<const uint8_t> bytes, uint32_t timeout_us) override {
-        const UsbResult sent = device_->write(bytes, timeout_ms(timeout_us));
-        if (sent.outcome != UsbOutcome::done) return fail(usb_outcome_text(sent.outcome));
+    std::string name() const override { return name_; }
+
+    Status write(std::span<const uint8_t> bytes, uint32_t timeout_us, const Deadline& deadline) override {
+        if (deadline.left_ms() == 0) return too_slow(deadline);
+        const UsbResult sent = device_->write(bytes, timeout_ms(timeout_us, deadline));
+        if (sent.outcome != UsbOutcome::done) return failure(sent.outcome);
+        if (sent.bytes != bytes.size())
+            return fail(fmt::format("{} took {} of {} bytes: plug it in again", name_, sent.bytes, bytes.size()));
         return Done{};
     }
 
-    Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us) override {
+    Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us, const Deadline& deadline) override {
         // An empty packet ends a message whose last packet was full; it is not what the caller waits for. No board sends many.
         for (int empty_packets = 0; empty_packets < empty_packets_max; ++empty_packets) {
+            if (deadline.left_ms() == 0) return too_slow(deadline);
             std::vector<uint8_t> bytes(capacity);
-            const UsbResult got = device_->read(bytes, timeout_ms(timeout_us));
-            if (got.outcome != UsbOutcome::done) return fail(usb_outcome_text(got.outcome));
-            bytes.resize(got.bytes);
+            const UsbResult got = device_->read(bytes, timeout_ms(timeout_us, deadline));
+            if (got.outcome != UsbOutcome::done) return failure(got.outcome);
+            bytes.resize(std::min(got.bytes, capacity));
             if (!bytes.empty()) return bytes;
         }
-        return fail("the board sends nothing but empty packets: plug it in again");
+        return fail(name_ + " sends nothing but empty packets: plug it in again");
     }
 
   private:
     static constexpr int empty_packets_max = 16;
-    static uint32_t timeout_ms(uint32_t timeout_us) { return (timeout_us + 999) / 1000; }
+
+    // Never 0, which libusb takes for no timeout.
+    static uint32_t timeout_ms(uint32_t timeout_us, const Deadline& deadline) {
+        return std::clamp((timeout_us + 999) / 1000, 1u, std::max(1u, uint32_t(deadline.left_ms())));
+    }
+    Error failure(UsbOutcome outcome) const { return fail(name_ + ": " + usb_outcome_text(outcome)); }
+    Error too_slow(const Deadline& deadline) const {
+        return fail(name_ + " has not finished an exchange " + deadline.text() + ": plug it in again and start over");
+    }
 
     std::unique_ptr<UsbDevice> device_;
+    std::string name_;
 };
 
 std::string serials_of(const std::vector<UsbListing>& boards) {
@@ -90,7 +106,7 @@ Result<UsbListing> find_running_board(UsbBus& bus, const std::string& serial) {
 Result<std::unique_ptr<Transfer>> open_usb_transfer(UsbBus& bus, const UsbListing& board) {
     auto device = bus.open(board);
     if (!device.ok()) return device.error();
-    return std::unique_ptr<Transfer>(std::make_unique<UsbTransfer>(std::move(*device)));
+    return std::unique_ptr<Transfer>(std::make_unique<UsbTransfer>(std::move(*device), board.serial));
 }
 
 }  // namespace ols

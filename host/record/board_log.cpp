@@ -2,8 +2,13 @@
 // Reading the trigger log while the board plays.
 #include "record/board_log.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <chrono>
 #include <optional>
+
+#include "device/log_reader.hpp"
 
 namespace ols {
 
@@ -22,9 +27,22 @@ std::string reason_to_end(const ols_status_reply& status, const std::string& why
 
 }  // namespace
 
-BoardLog::BoardLog(Board& board, const std::atomic<uint64_t>& arrivals, std::function<std::string()> why_stop,
-                   std::function<void(LogNews)> on_news, std::function<void(LogEnd)> on_end)
-    : board_(board), arrivals_(arrivals), why_stop_(std::move(why_stop)), on_news_(std::move(on_news)) {
+PlayBounds::PlayBounds(const Sequence& sequence) {
+    // Of the sequence's own time; a cycle for what comes before its first light, and a second.
+    if (sequence.config.cycles == 0) return;
+    triggers = std::min<uint64_t>(triggers, sequence.trigger_count());
+    if (sequence.config.playback.start == StartSource::photo) return;  // each cycle waits for as long as it must
+    ticks = (uint64_t(sequence.config.cycles) + 1) * sequence.cycle_ticks() + tick_hz;
+}
+
+BoardLog::BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uint64_t>& arrivals,
+                   std::function<std::string()> why_stop, std::function<void(LogNews)> on_news,
+                   std::function<void(LogEnd)> on_end)
+    : board_(board),
+      bounds_(bounds),
+      arrivals_(arrivals),
+      why_stop_(std::move(why_stop)),
+      on_news_(std::move(on_news)) {
     thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
 }
 
@@ -33,26 +51,50 @@ BoardLog::~BoardLog() {
 }
 
 LogEnd BoardLog::follow() {
-    uint32_t next = 0, known = 0;
+    LogEnd end = read_to_end();
+    if (end.is_lost) board_.tell_to_stop();
+    return end;
+}
+
+// A board that plays has a clock that goes on, and not for longer than the program.
+Status BoardLog::check_clock(const ols_status_reply& status) {
+    if (!next_tick_ || status.now_ticks != last_tick_ || status.state != OLS_STATE_PLAYING) {
+        last_tick_ = status.now_ticks;
+        next_tick_.emplace(board_.begin_exchange());
+    }
+    if (next_tick_->left_ms() == 0)
+        return fail(fmt::format("{} says that it plays, and its clock has stood still at tick {}: reset it",
+                                board_.name(), last_tick_));
+    if (status.now_ticks > bounds_.ticks && status.state == OLS_STATE_PLAYING)
+        return fail(fmt::format("{} plays on at tick {}, and the program ends before tick {}: reset it", board_.name(),
+                                last_tick_, bounds_.ticks));
+    return Done{};
+}
+
+LogEnd BoardLog::read_to_end() {
+    LogReader reader(board_, bounds_.triggers);
     std::string told_to_stop;
     std::optional<std::string> ending;
-    for (;;) {
+    for (std::optional<uint32_t> fired_at_end;;) {
         if (told_to_stop.empty() && !(told_to_stop = why_stop_()).empty()) {
             // A board that has finished or failed meanwhile refuses, which its status then explains.
             (void)board_.stop();
         }
         const uint64_t arrivals = arrivals_;
-        auto log = board_.read_trigger_log(next, known);
+        auto log = reader.read_on();
         if (!log.ok()) return {log.error().message, true};
         const size_t count = log->entries.size();
-        if (count) next = log->entries.back().counter + 1;
-        known = log->next_counter;
-        on_news_({std::move(log->entries), log->next_counter, arrivals});
+        on_news_({std::move(log->entries), reader.fired(), arrivals});
+        if (ending && fired_at_end.value_or(reader.fired()) != reader.fired())
+            return {board_.name() + " fires on although it says that it has stopped: reset it", true};
+        if (ending) fired_at_end = reader.fired();
         if (count >= OLS_LOG_ENTRIES_MAX) continue;
         if (ending && count == 0) return {*ending};
+        if (ending) continue;
         const auto status = board_.status();
         if (!status.ok()) return {status.error().message, true};
         if (status->boot_nonce != board_.info().boot_nonce) return {"the board was reset", true};
+        if (const Status goes_on = check_clock(*status); !goes_on.ok()) return {goes_on.error().message, true};
         if (status->state != OLS_STATE_PLAYING && status->state != OLS_STATE_WAITING)
             ending = reason_to_end(*status, told_to_stop);
         else

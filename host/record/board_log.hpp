@@ -4,11 +4,13 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "device/board.hpp"
+#include "stage/sequence.hpp"
 
 namespace ols {
 
@@ -24,22 +26,37 @@ struct LogEnd {
     bool is_lost = false;  // it is heard no more: what it fired later than the last news is not known
 };
 
+// What a program can fire and last at most; a board that does more is not believed.
+struct PlayBounds {
+    uint64_t triggers = UINT32_MAX;
+    uint64_t ticks = UINT64_MAX;  // from its start
+
+    explicit PlayBounds(const Sequence& sequence);
+};
+
 class BoardLog {
   public:
     // Starts to follow; all functions are called from the thread. `arrivals` counts the frames read from the camera.
     // on_end comes once, last.
     // When `why_stop` says something the board is told to stop, and what it fired until then is still read; LogEnd says it.
-    BoardLog(Board& board, const std::atomic<uint64_t>& arrivals, std::function<std::string()> why_stop,
-             std::function<void(LogNews)> on_news, std::function<void(LogEnd)> on_end);
+    // A board that is heard no more, or whose log or clock does not go on as it must, is told to stop and given up.
+    BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uint64_t>& arrivals,
+             std::function<std::string()> why_stop, std::function<void(LogNews)> on_news,
+             std::function<void(LogEnd)> on_end);
     ~BoardLog();  // waits for the end
 
   private:
     LogEnd follow();
+    LogEnd read_to_end();
+    Status check_clock(const ols_status_reply& status);
 
     Board& board_;
+    const PlayBounds bounds_;
     const std::atomic<uint64_t>& arrivals_;
     std::function<std::string()> why_stop_;
     std::function<void(LogNews)> on_news_;
+    uint64_t last_tick_ = 0;  // that the board told
+    std::optional<Deadline> next_tick_;
     std::thread thread_;
 };
 

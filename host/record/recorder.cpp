@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <future>
 #include <semaphore>
 #include <thread>
 #include <unordered_map>
@@ -22,6 +23,11 @@ constexpr int read_pause_ms = 20;
 // camera's word; a camera that lives says by its watermark when it has delivered everything, and one whose program has
 // ended is known at once.
 constexpr int silent_looks_max = Camera::device_patience_ms / read_pause_ms;
+// After the board's end a camera that lives is behind by what its driver keeps: some tens of frames. One that is not at its end
+// after so long, by the wall's clock, never will be; nor is it waited for as long when the user has stopped the take.
+constexpr std::chrono::seconds ending_patience(300), stopped_patience(10);
+// Frames from behind the last trigger by which those before it have come, be some of them late.
+constexpr size_t late_frames_max = 2 * IdentifyOptions{}.reorder_frames;
 // A camera that has not seen one trigger cannot tell when the last one was due. By its own clock it is given so long after the
 // board's end.
 constexpr uint64_t blind_patience_ns = 10'000'000'000;
@@ -123,13 +129,19 @@ class CameraReader {
 // The caller's side: identification and its account.
 class Recording {
   public:
-    Recording(const Sequence& sequence, const RecordSink& sink, uint64_t camera_ns_at_start)
-        : sequence_(sequence), sink_(sink), identifier_(sequence, options_for(sequence, camera_ns_at_start)) {
+    Recording(const Sequence& sequence, const RecordSink& sink, uint64_t camera_ns_at_start,
+              const std::atomic<bool>& stop)
+        : sequence_(sequence),
+          sink_(sink),
+          stop_(stop),
+          identifier_(sequence, options_for(sequence, camera_ns_at_start)) {
         report_.slots_total = sequence.trigger_count();
     }
 
     void handle(Event event) {
         std::visit([this](auto& news) { take(std::move(news)); }, event);
+        if (log_ended_ && !finished_ && Clock::now() - log_end_ > (stop_ ? stopped_patience : ending_patience))
+            finish("the camera went on without coming to an end: check it, or the program that reads it");
         hand_on();
     }
     bool finished() const { return finished_; }
@@ -141,12 +153,16 @@ class Recording {
     }
 
   private:
+    using Clock = std::chrono::steady_clock;
+
     void take(FrameNews news) {
         ++report_.frames;
         if (!news.witness.whole && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
         silent_looks_ = 0;
+        const uint64_t timestamp_ns = news.witness.stamp.timestamp_ns;
         frames_[news.witness.arrival] = std::move(news.frame);
         identifier_.add_frame(std::move(news.witness));
+        if (log_ended_) finish_if_beyond(timestamp_ns);
     }
     void take(LogNews news) {
         fired_ = std::max(fired_, news.next_counter);
@@ -156,14 +172,15 @@ class Recording {
         report_.board_end = end.why;
         identifier_.end_log(end.why);
         log_ended_ = true;
+        log_end_ = Clock::now();
         log_end_watermark_ns_ = last_watermark_ns_;
         // A camera that is live may have more to give, and says so at its next pause.
         if (camera_state_.kind != CameraState::live) finish_if_all_came();
     }
     void take(CameraPause pause) {
         report_.clock_drift_ppm = identifier_.placer().drift_ppm().value_or(report_.clock_drift_ppm);
-        silent_looks_ = pause.watermark_ns == last_watermark_ns_ ? silent_looks_ + 1 : 0;
-        last_watermark_ns_ = pause.watermark_ns;
+        silent_looks_ = pause.watermark_ns <= last_watermark_ns_ ? silent_looks_ + 1 : 0;
+        last_watermark_ns_ = std::max(last_watermark_ns_, pause.watermark_ns);
         camera_state_ = std::move(pause.state);
         if (log_ended_) finish_if_all_came();  // else the board still tells of triggers whose frames came
     }
@@ -175,13 +192,20 @@ class Recording {
         else if (silent_looks_ > silent_looks_max)
             finish("the camera showed no sign of life for a minute: check it, or the program that reads it");
     }
+    // A camera that no trigger holds back does not pause. All has come when it has gone beyond the last trigger, by its time or
+    // by more frames than there are triggers.
+    void finish_if_beyond(uint64_t timestamp_ns) {
+        if (has_delivered_all(timestamp_ns)) ++frames_beyond_;
+        ++frames_after_end_;
+        if (frames_beyond_ > late_frames_max || frames_after_end_ > fired_ + late_frames_max) finish("");
+    }
     void finish(std::string why) {
         identifier_.end_frames(why);
         report_.camera_end = std::move(why);
         finished_ = true;
     }
 
-    // By the camera's own word: its watermark is past the last trigger that was fired.
+    // By the camera's own word: its watermark, or a frame's time, is past the last trigger that was fired.
     bool has_delivered_all(uint64_t watermark_ns) const {
         if (fired_ == 0) return true;
         const auto last_ns = identifier_.placer().latest_time_of_ns(fired_ - 1);
@@ -214,18 +238,30 @@ class Recording {
 
     const Sequence& sequence_;
     const RecordSink& sink_;
+    const std::atomic<bool>& stop_;
     Identifier identifier_;
     std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
     RecordReport report_;
     uint64_t fired_ = 0, last_watermark_ns_ = 0, log_end_watermark_ns_ = 0;
     int silent_looks_ = 0;
+    uint64_t frames_after_end_ = 0, frames_beyond_ = 0;  // of the log; of these, from behind the last trigger
     CameraState camera_state_;
     bool log_ended_ = false, finished_ = false;
+    Clock::time_point log_end_;
 };
+
+// The camera's time at its start. A start that the camera does not answer ends when the user wants to stop.
+Result<uint64_t> start_unless(Camera& camera, const std::atomic<bool>& stop) {
+    auto started = std::async(std::launch::async, [&] { return camera.start(); });
+    while (started.wait_for(std::chrono::milliseconds(read_pause_ms)) != std::future_status::ready)
+        if (stop) camera.stop();
+    return started.get();
+}
 
 // A camera that delivers, until this goes.
 struct StartedCamera {
-    explicit StartedCamera(Camera& started) : camera(started), time_ns(started.start()) {}
+    StartedCamera(Camera& started, const std::atomic<bool>& stop)
+        : camera(started), time_ns(start_unless(started, stop)) {}
     ~StartedCamera() { camera.stop(); }
     StartedCamera(const StartedCamera&) = delete;
     Camera& camera;
@@ -251,7 +287,9 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
         !s.ok())
         return s;
     if (Status s = board.arm(sequence.config.playback); !s.ok()) return s;
-    return board.start();
+    Status started = board.start();
+    if (!started.ok()) board.tell_to_stop();  // it may play without its answer having come
+    return started;
 }
 
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
@@ -264,13 +302,14 @@ Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& s
     const CameraConfig& config = stage.cameras[0];
     if (const Status status = camera.set_up(config); !status.ok()) return status.error();
     const CameraCounts counts_before = camera.counts();
-    const StartedCamera started(camera);
+    const StartedCamera started(camera, stop);
     if (!started.time_ns.ok()) return started.time_ns.error();
+    if (stop) return fail("stopped before the take began");
     if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
 
     const size_t in_flight = frames_in_flight(sequence, sink.cycles_kept);
     EventQueue<Event> queue(in_flight + 64);
-    Recording recording(sequence, sink, *started.time_ns);
+    Recording recording(sequence, sink, *started.time_ns, stop);
     const auto why_stop = [&]() -> std::string {
         if (stop) return "the take was stopped";
         const CameraState state = camera.state();
@@ -279,8 +318,8 @@ Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& s
     {
         CameraReader reader(camera, config, black_counts, in_flight, queue);
         BoardLog log(
-            board, reader.arrivals(), why_stop, [&](LogNews news) { queue.push(std::move(news)); },
-            [&](LogEnd end) { queue.push(std::move(end)); });
+            board, PlayBounds(sequence), reader.arrivals(), why_stop,
+            [&](LogNews news) { queue.push(std::move(news)); }, [&](LogEnd end) { queue.push(std::move(end)); });
         while (!recording.finished()) recording.handle(std::move(*queue.pop()));
         queue.close();
     }

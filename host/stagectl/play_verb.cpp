@@ -51,11 +51,10 @@ Result<Sequence> compile(const Options& options, const StageConfig& stage) {
     return compile_sequence(*config, stage);
 }
 
-void follow(Board& board, bool json, Account& account) {
+void follow(Board& board, const Sequence& sequence, const std::atomic<bool>& stop, bool json, Account& account) {
     static const std::atomic<uint64_t> no_frames{0};
-    const std::atomic<bool>& stop = stop_on_signal();
     const BoardLog log(
-        board, no_frames, [&] { return std::string(stop ? "stopped by you" : ""); },
+        board, PlayBounds(sequence), no_frames, [&] { return std::string(stop ? "stopped by you" : ""); },
         [&](const LogNews& news) { account.add(news, json); }, [&](LogEnd end) { account.end = std::move(end); });
     // Its destructor waits for the end.
 }
@@ -68,9 +67,10 @@ Result<int> run(const Options& options) {
     auto board = open_board(options.links, *stage);
     if (!board.ok()) return board.error();
     warn_of_flicker(*sequence);
+    const std::atomic<bool>& stop = stop_on_signal();
     if (const Status status = start_board(*board, *sequence, *stage); !status.ok()) return status.error();
     Account account;
-    follow(*board, options.json, account);
+    follow(*board, *sequence, stop, options.json, account);
     if (account.end.is_lost)
         return fail(
             fmt::format("{}; after {} triggers the board's log could not be read", account.end.why, account.triggers));
@@ -82,7 +82,7 @@ Result<int> run(const Options& options) {
         fmt::print(stderr, "; {} edges, {} of them missed", uint32_t(status->edges_seen),
                    uint32_t(status->edges_missed));
     fmt::print(stderr, "\n");
-    if (!account.end.why.empty() && !stop_on_signal()) return fail(account.end.why);
+    if (!account.end.why.empty() && !stop) return fail(account.end.why);
     return account.unseen() ? 2 : 0;
 }
 

@@ -39,10 +39,11 @@ std::string board_link(const LinkOptions& options, const StageConfig& stage) {
     return options.board.empty() ? stage.board : options.board;
 }
 
-Result<Board> connect_board(const std::string& link) {
-    auto transfer = open_transfer(link);
+Result<Board> connect_board(const std::string& link, const LinkOptions& options) {
+    Patience patience(int(options.patience_s * 1e3), &stop_requested);
+    auto transfer = open_transfer(link, patience.begin_exchange());
     if (!transfer.ok()) return transfer.error();
-    return Board::connect(std::move(*transfer));
+    return Board::connect(std::move(*transfer), patience);
 }
 
 Error which_board() {
@@ -61,6 +62,10 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
     verb.add_option("--wait", wait_s,
                     "seconds to wait for what is not there yet, as a virtual stage that still renders")
         ->check(CLI::NonNegativeNumber);
+    verb.add_option("--patience", patience_s,
+                    "seconds of the wall's clock that the board may take for one answer before it is given up")
+        ->check(CLI::Range(0.1, 3600.0))
+        ->capture_default_str();
 }
 
 Result<StageConfig> open_stage(const LinkOptions& options) {
@@ -71,7 +76,7 @@ Result<StageConfig> open_stage(const LinkOptions& options) {
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage) {
     const std::string link = board_link(options, stage);
     if (link.empty()) return which_board();
-    return open_within(options.wait_s, [&] { return connect_board(link); });
+    return open_within(options.wait_s, [&] { return connect_board(link, options); });
 }
 
 Result<StageSession> open_session(const LinkOptions& options) {
@@ -90,7 +95,7 @@ Result<StageSession> open_session(const LinkOptions& options) {
     return open_within(options.wait_s, [&]() -> Result<StageSession> {
         auto camera = open_camera(source);
         if (!camera.ok()) return camera.error();
-        auto board = connect_board(link);
+        auto board = connect_board(link, options);
         if (!board.ok()) return board.error();
         return StageSession{*stage, std::make_unique<Board>(std::move(*board)), std::move(*camera)};
     });

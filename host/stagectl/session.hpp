@@ -13,10 +13,11 @@
 
 namespace ols {
 
-// --stage, --board, --camera and --wait.
+// --stage, --board, --camera, --wait and --patience.
 struct LinkOptions {
     std::string stage_path, board, camera;
     double wait_s = 0;
+    double patience_s = Patience::exchange_ms / 1e3;
 
     void add_to(CLI::App& verb, bool with_camera);
 };
@@ -34,7 +35,8 @@ Result<StageConfig> open_stage(const LinkOptions& options);
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage);
 Result<StageSession> open_session(const LinkOptions& options);
 
-// Turns true at the first SIGINT or SIGTERM; the second ends the program at once.
+// Turns true at the first SIGINT or SIGTERM, which also ends every wait for the board within Patience::stop_ms; the second ends
+// the program at once.
 const std::atomic<bool>& stop_on_signal();
 
 // Draws "label 42 %" on a terminal, nothing elsewhere; ends the line at the last.

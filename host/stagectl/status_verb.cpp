@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "device/cycle_check.hpp"
+#include "device/log_reader.hpp"
 #include "program.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
@@ -27,25 +28,16 @@ struct CheckedCycle {
 };
 
 Result<std::vector<CheckedCycle>> check_cycles(Board& board) {
-    std::vector<ols_trigger_log_entry> entries;
-    for (uint32_t next = 0;;) {
-        const auto log = board.read_trigger_log(next);
-        if (!log.ok()) return log.error();
-        if (log->entries.empty()) break;
-        entries.insert(entries.end(), log->entries.begin(), log->entries.end());
-        next = entries.back().counter + 1;
-    }
+    const auto entries = read_kept_log(board);
+    if (!entries.ok()) return entries.error();
+    const auto digests = read_kept_digests(board);
+    if (!digests.ok()) return digests.error();
     std::vector<CheckedCycle> cycles;
-    for (uint32_t next = 0;;) {
-        const auto read = board.read_digests(next);
-        if (!read.ok()) return read.error();
-        if (read->digests.empty()) return cycles;
-        for (const ols_cycle_digest& digest : read->digests) {
-            const Status checked = check_cycle(digest, entries);
-            cycles.push_back({digest, checked.ok() ? "" : checked.error().message});
-        }
-        next = read->first_digest + uint32_t(read->digests.size());
+    for (const ols_cycle_digest& digest : *digests) {
+        const Status checked = check_cycle(digest, *entries);
+        cycles.push_back({digest, checked.ok() ? "" : checked.error().message});
     }
+    return cycles;
 }
 
 void print_cycles(const std::vector<CheckedCycle>& cycles) {

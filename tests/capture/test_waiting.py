@@ -107,7 +107,7 @@ def test_a_board_and_a_camera_that_another_program_has_are_busy_and_not_gone(sta
     run = begin(stage, stage.folder / "take.rfa")
     for verb in (("status",), ("play", sequence("s159"))):
         printed = stage.stagectl(*verb, camera=False, code=1)
-        assert "board is busy" in printed and "gone" not in printed, printed
+        assert "the board at" in printed and "is busy" in printed and "gone" not in printed, printed
     printed = stage.stagectl("run", "--sequence", sequence("single"), "--nominal", "-o", stage.folder / "other.rfa", code=1)
     assert "camera" in printed and "is busy" in printed, printed
     run.send_signal(signal.SIGINT)

@@ -34,7 +34,7 @@ class ScriptedBoard : public Transfer {
     using Script = std::function<Answer(uint16_t type, const Bytes& payload)>;
     ScriptedBoard(Script script, size_t piece) : script_(std::move(script)), piece_(piece) {}
 
-    Status write(std::span<const uint8_t> bytes, uint32_t) override {
+    Status write(std::span<const uint8_t> bytes, uint32_t, const Deadline&) override {
         ols_frame_parser_write(&parser_, bytes.data(), bytes.size());
         ols_frame frame;
         while (ols_frame_parser_read(&parser_, &frame)) {
@@ -47,7 +47,7 @@ class ScriptedBoard : public Transfer {
         }
         return Done{};
     }
-    Result<Bytes> read(size_t capacity, uint32_t) override {
+    Result<Bytes> read(size_t capacity, uint32_t, const Deadline&) override {
         if (out_.empty()) return fail("the board did not answer in time");
         const size_t n = std::min({capacity, piece_, out_.size()});
         Bytes piece(out_.begin(), out_.begin() + ptrdiff_t(n));
@@ -70,6 +70,11 @@ ols_hello_reply hello_reply() {
     reply.tick_hz = 125'000'000;
     reply.chain_bits = 176;
     return reply;
+}
+
+// Of a board that fires every 1000 ticks.
+ols_trigger_log_entry entry_at(uint32_t counter) {
+    return {1000ull * counter, counter, 0, 0, 1, 0};
 }
 
 Result<Board> connect(ScriptedBoard::Script script, size_t piece = 64) {
@@ -193,7 +198,7 @@ TEST(Board, a_log_that_is_far_behind_is_asked_for_by_four_messages_in_one_write)
         const uint32_t count = std::min<uint32_t>(what.entries_max, fired - what.first_counter);
         Bytes reply = bytes_of(ols_trigger_log_reply{what.first_counter, fired, 0, uint16_t(count), 0});
         for (uint32_t i = 0; i < count; ++i) {
-            const Bytes entry = bytes_of(ols_trigger_log_entry{0, what.first_counter + i, 0, 0, 1, 0});
+            const Bytes entry = bytes_of(entry_at(what.first_counter + i));
             reply.insert(reply.end(), entry.begin(), entry.end());
         }
         return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};
@@ -219,7 +224,7 @@ TEST(Board, entries_that_several_replies_repeat_because_what_was_asked_for_is_go
         oldest += 5;
         Bytes reply = bytes_of(ols_trigger_log_reply{first, 1524, 400, what.entries_max, 0});
         for (uint32_t i = 0; i < what.entries_max; ++i) {
-            const Bytes entry = bytes_of(ols_trigger_log_entry{0, first + i, 0, 0, 1, 0});
+            const Bytes entry = bytes_of(entry_at(first + i));
             reply.insert(reply.end(), entry.begin(), entry.end());
         }
         return Answer{OLS_READ_TRIGGER_LOG | OLS_REPLY, reply};
@@ -256,8 +261,8 @@ TEST(Board, a_reply_to_an_earlier_request_and_noise_are_passed_over) {
 
 TEST(Board, one_that_sends_without_end_and_never_what_was_asked_for_is_given_up) {
     class Chatterer : public Transfer {
-        Status write(std::span<const uint8_t>, uint32_t) override { return Done{}; }
-        Result<Bytes> read(size_t, uint32_t) override {
+        Status write(std::span<const uint8_t>, uint32_t, const Deadline&) override { return Done{}; }
+        Result<Bytes> read(size_t, uint32_t, const Deadline&) override {
             uint8_t stale[OLS_FRAME_BYTES_MAX];
             const size_t n = ols_frame_encode(OLS_HELLO | OLS_REPLY, 999, nullptr, 0, stale, sizeof stale);
             return Bytes(stale, stale + n);
@@ -271,6 +276,8 @@ TEST(Board, one_that_sends_without_end_and_never_what_was_asked_for_is_given_up)
 TEST(Board, a_silent_or_missing_board_is_an_error) {
     auto board = connect([](uint16_t, const Bytes&) { return Answer{0x1234, {}}; });
     EXPECT_FALSE(board->status().ok());
-    EXPECT_NE(open_transfer("socket:/nonexistent.sock").error().message.find("start the stage"), std::string::npos);
-    EXPECT_NE(open_transfer("usb").error().message.find("socket:PATH"), std::string::npos);
+    Patience patience;
+    const auto open = [&](const char* link) { return open_transfer(link, patience.begin_exchange()); };
+    EXPECT_NE(open("socket:/nonexistent.sock").error().message.find("start the stage"), std::string::npos);
+    EXPECT_NE(open("usb").error().message.find("socket:PATH"), std::string::npos);
 }

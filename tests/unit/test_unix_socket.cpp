@@ -19,7 +19,14 @@ using namespace ols;
 
 namespace {
 
-constexpr int short_ms = 30;
+constexpr int short_ms = 30, long_ms = 60'000;
+
+// An exchange that begins now, and has so long.
+Deadline within(int ms) {
+    static Patience patience(0);
+    patience = Patience(ms);
+    return patience.begin_exchange();
+}
 
 // Listens, and does with clients what the test says.
 class OtherEnd : public testing::Test {
@@ -51,30 +58,31 @@ std::string error_of(const Result<std::vector<uint8_t>>& result) {
 }  // namespace
 
 TEST_F(OtherEnd, a_board_that_does_not_move_is_given_up_and_named) {
-    auto transfer = open_socket_transfer(path_, short_ms);
+    auto transfer = open_socket_transfer(path_, within(short_ms));
     ASSERT_TRUE(transfer.ok());
     const int client = accept_client();
-    const std::string error = error_of((*transfer)->read(64, 1000));
-    EXPECT_NE(error.find("has not moved for 0.03 s"), std::string::npos) << error;
+    const std::string error = error_of((*transfer)->read(64, 1000, within(short_ms)));
+    EXPECT_NE(error.find("has not finished an exchange within 0.03 s"), std::string::npos) << error;
     EXPECT_NE(error.find(path_), std::string::npos) << error;
     close(client);
 }
 
 TEST_F(OtherEnd, a_board_that_takes_nothing_is_given_up_too) {
-    auto transfer = open_socket_transfer(path_, short_ms);
+    auto transfer = open_socket_transfer(path_, within(short_ms));
     const int client = accept_client();
-    const Status sent = (*transfer)->write(std::vector<uint8_t>(64 << 20), 1000);
+    const Status sent = (*transfer)->write(std::vector<uint8_t>(64 << 20), 1000, within(short_ms));
     ASSERT_FALSE(sent.ok());
-    EXPECT_NE(sent.error().message.find("has not moved"), std::string::npos) << sent.error().message;
+    EXPECT_NE(sent.error().message.find("has not finished an exchange"), std::string::npos) << sent.error().message;
     close(client);
 }
 
 TEST_F(OtherEnd, connecting_to_one_that_lets_nobody_in_ends) {
     std::vector<UnixSocket> queue;
     for (int n = 0; n < 100; ++n) {
-        auto socket = UnixSocket::connect(path_, "the board", short_ms);
+        auto socket = UnixSocket::connect(path_, "the board", within(short_ms));
         if (!socket.ok()) {
-            EXPECT_NE(socket.error().message.find("has not moved"), std::string::npos) << socket.error().message;
+            EXPECT_NE(socket.error().message.find("has not finished an exchange"), std::string::npos)
+                << socket.error().message;
             return;
         }
         queue.push_back(std::move(*socket));
@@ -83,21 +91,21 @@ TEST_F(OtherEnd, connecting_to_one_that_lets_nobody_in_ends) {
 }
 
 TEST_F(OtherEnd, a_bus_that_does_not_tell_the_time_is_given_up) {
-    const auto bus = open_can_socket(path_, short_ms);
+    const auto bus = open_can_socket(path_, within(short_ms));
     ASSERT_FALSE(bus.ok());
     EXPECT_NE(bus.error().message.find("the CAN bus"), std::string::npos) << bus.error().message;
-    EXPECT_NE(bus.error().message.find("has not moved"), std::string::npos) << bus.error().message;
+    EXPECT_NE(bus.error().message.find("has not finished an exchange"), std::string::npos) << bus.error().message;
 }
 
 TEST_F(OtherEnd, a_board_that_went_is_gone) {
-    auto transfer = open_socket_transfer(path_);
+    auto transfer = open_socket_transfer(path_, within(long_ms));
     close(accept_client());
-    const std::string error = error_of((*transfer)->read(64, 1000));
+    const std::string error = error_of((*transfer)->read(64, 1000, within(long_ms)));
     EXPECT_NE(error.find("is gone"), std::string::npos) << error;
 }
 
 TEST_F(OtherEnd, a_board_that_turns_a_client_away_is_busy_and_not_gone) {
-    auto transfer = open_socket_transfer(path_);
+    auto transfer = open_socket_transfer(path_, within(long_ms));
     std::thread board([&] {
         const int client = accept_client();
         struct {
@@ -108,14 +116,14 @@ TEST_F(OtherEnd, a_board_that_turns_a_client_away_is_busy_and_not_gone) {
         EXPECT_EQ(write(client, &busy, sizeof busy), ssize_t(sizeof busy));
         close(client);
     });
-    const std::string error = error_of((*transfer)->read(64, 1000));
+    const std::string error = error_of((*transfer)->read(64, 1000, within(long_ms)));
     board.join();
     EXPECT_NE(error.find("busy"), std::string::npos) << error;
     EXPECT_EQ(error.find("gone"), std::string::npos) << error;
 }
 
 TEST_F(OtherEnd, what_is_not_there_says_to_start_the_stage) {
-    const auto transfer = open_socket_transfer(path_ + "x");
+    const auto transfer = open_socket_transfer(path_ + "x", within(long_ms));
     ASSERT_FALSE(transfer.ok());
     EXPECT_NE(transfer.error().message.find("start the stage first"), std::string::npos);
 }

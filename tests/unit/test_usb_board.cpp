@@ -13,6 +13,11 @@ using namespace ols::test;
 
 namespace {
 
+Deadline within_a_minute() {
+    static Patience patience(60'000);
+    return patience.begin_exchange();
+}
+
 class UsbBoards : public testing::Test {
   protected:
     void SetUp() override {
@@ -96,20 +101,65 @@ class ScriptedBus : public ModelBus {
     }
 };
 
+// One that sends a byte a read, for ever.
+class TricklingBus : public ModelBus {
+  public:
+    size_t bytes = 0;
+    Result<std::unique_ptr<UsbDevice>> open(const UsbListing&) override {
+        class Device : public UsbDevice {
+          public:
+            explicit Device(size_t& bytes) : bytes_(bytes) {}
+            UsbResult control(uint8_t, uint8_t, std::span<uint8_t>, uint32_t) override {
+                return {UsbOutcome::stalled, 0};
+            }
+            UsbResult write(std::span<const uint8_t> sent, uint32_t) override {
+                return {UsbOutcome::done, sent.size()};
+            }
+            UsbResult read(std::span<uint8_t> buffer, uint32_t) override {
+                buffer[0] = uint8_t(++bytes_);
+                return {UsbOutcome::done, 1};
+            }
+
+          private:
+            size_t& bytes_;
+        };
+        return std::unique_ptr<UsbDevice>(std::make_unique<Device>(bytes));
+    }
+};
+
 TEST(UsbTransfer, passes_over_the_empty_packet_that_ends_a_message) {
     ScriptedBus bus;
     bus.reads = {{UsbOutcome::done, 0}, {UsbOutcome::done, 3}};
     const auto transfer = open_usb_transfer(bus, {});
-    EXPECT_EQ(*(*transfer)->read(64, 1500), Bytes(3, 0x55));
+    EXPECT_EQ(*(*transfer)->read(64, 1500, within_a_minute()), Bytes(3, 0x55));
 }
 
 TEST(UsbTransfer, gives_up_a_board_that_sends_nothing_but_empty_packets) {
     ScriptedBus bus;
     bus.reads.assign(1000, {UsbOutcome::done, 0});
     const auto transfer = open_usb_transfer(bus, {});
-    const auto read = (*transfer)->read(64, 1500);
+    const auto read = (*transfer)->read(64, 1500, within_a_minute());
     ASSERT_FALSE(read.ok());
     EXPECT_NE(read.error().message.find("empty packets"), std::string::npos) << read.error().message;
+}
+
+TEST(UsbTransfer, an_exchange_that_is_over_ends_before_the_next_transfer_and_names_the_board) {
+    ScriptedBus bus;  // none of its transfers may be asked for
+    UsbListing listing;
+    listing.serial = "00f1";
+    const auto transfer = open_usb_transfer(bus, listing);
+    Patience none(0);
+    for (const std::string& problem : {(*transfer)->read(64, 1500, none.begin_exchange()).error().message,
+                                       (*transfer)->write(Bytes(3), 1500, none.begin_exchange()).error().message})
+        EXPECT_NE(problem.find("the board usb:00f1 has not finished an exchange"), std::string::npos) << problem;
+}
+
+TEST(UsbTransfer, a_board_that_trickles_is_given_up_within_the_bytes_of_a_few_frames) {
+    TricklingBus bus;
+    const auto board = Board::connect(std::move(*open_usb_transfer(bus, {})));
+    ASSERT_FALSE(board.ok());
+    EXPECT_NE(board.error().message.find("not the answer"), std::string::npos) << board.error().message;
+    EXPECT_LE(bus.bytes, 16u * OLS_FRAME_BYTES_MAX);
 }
 
 TEST(UsbTransfer, names_each_way_in_which_a_transfer_ends_early) {
@@ -117,7 +167,7 @@ TEST(UsbTransfer, names_each_way_in_which_a_transfer_ends_early) {
     bus.reads = {{UsbOutcome::stalled, 0}, {UsbOutcome::timed_out, 0}, {UsbOutcome::gone, 0}, {UsbOutcome::failed, 0}};
     const auto transfer = open_usb_transfer(bus, {});
     for (const char* expected : {"stalled", "in time", "unplugged", "cable"}) {
-        const auto read = (*transfer)->read(64, 1500);
+        const auto read = (*transfer)->read(64, 1500, within_a_minute());
         ASSERT_FALSE(read.ok());
         EXPECT_NE(read.error().message.find(expected), std::string::npos) << read.error().message;
     }
