@@ -5,6 +5,8 @@
 #include <chrono>
 #include <optional>
 
+#include "exceptions.hpp"
+
 namespace ols {
 
 namespace {
@@ -25,7 +27,10 @@ std::string reason_to_end(const ols_status_reply& status, const std::string& why
 BoardLog::BoardLog(Board& board, const std::atomic<uint64_t>& arrivals, std::function<std::string()> why_stop,
                    std::function<void(LogNews)> on_news, std::function<void(LogEnd)> on_end)
     : board_(board), arrivals_(arrivals), why_stop_(std::move(why_stop)), on_news_(std::move(on_news)) {
-    thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
+    thread_ = std::thread([this, on_end = std::move(on_end)] {
+        auto end = guarded("the board's log cannot be followed", [this] { return Result<LogEnd>(follow()); });
+        on_end(end ? std::move(*end) : LogEnd{end.error().message, true});
+    });
 }
 
 BoardLog::~BoardLog() {
