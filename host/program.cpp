@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -78,6 +79,24 @@ int parse(CLI::App& app, int argc, char** argv, const int& exit_code) {
     return 1;
 }
 
+// Flushes what was printed, and says what did not arrive: the exit code.
+int finish_printing(const CLI::App& app, int code) {
+    errno = 0;  // std::cout, which CLI11 prints help to, keeps nothing back from stdout
+    const bool flushed = std::fflush(stdout) == 0;
+    const int error = errno;
+    if (flushed && !std::ferror(stdout)) return code;
+    std::fprintf(stderr, "%s: what was printed did not all arrive%s%s: check where standard output leads\n",
+                 app.get_name().c_str(), flushed ? "" : ": ", flushed ? "" : std::strerror(error));
+    return code == 0 ? 1 : code;
+}
+
+// OpenBLAS, which OpenCV brings along, starts threads when it is loaded. One that finds no memory for its buffer tries for ever,
+// and exit() would wait for it.
+bool may_have_threads_that_never_end() {
+    rlimit limit{};
+    return getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+}
+
 }  // namespace
 
 int run_program(CLI::App& app, int argc, char** argv, const int& exit_code) {
@@ -90,13 +109,9 @@ int run_program(CLI::App& app, int argc, char** argv, const int& exit_code) {
     } catch (const std::exception&) {  // not even memory for the message
         std::fputs("memory ran out: close other programs, or raise the limit (ulimit -v)\n", stderr);
     }
-    errno = 0;  // std::cout, which CLI11 prints help to, keeps nothing back from stdout
-    const bool flushed = std::fflush(stdout) == 0;
-    const int error = errno;
-    if (flushed && !std::ferror(stdout)) return code;
-    std::fprintf(stderr, "%s: what was printed did not all arrive%s%s: check where standard output leads\n",
-                 app.get_name().c_str(), flushed ? "" : ": ", flushed ? "" : std::strerror(error));
-    return code == 0 ? 1 : code;
+    code = finish_printing(app, code);
+    if (may_have_threads_that_never_end()) _exit(code);
+    return code;
 }
 
 void print_json(const nlohmann::json& json, int indent) {

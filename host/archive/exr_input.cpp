@@ -10,6 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "exceptions.hpp"
+
 namespace ols {
 
 namespace {
@@ -97,7 +99,7 @@ Status check_exr_headers(const ArchiveFile& file) {
         skip_headers(input, file.size());
         return Done{};
     } catch (const std::exception& e) {
-        return fail("cannot read '" + file.path() + "': " + e.what());
+        return fail("cannot read '" + file.path() + "': " + words_of(e));
     }
 }
 
