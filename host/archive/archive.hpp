@@ -3,7 +3,7 @@
 // was finished, and how it is read.
 //
 //   take.rfa/manifest.json             what the take is, its lamps, and what else is known; rewritten by rename
-//   take.rfa/journal.jsonl             one fsynced line an event: begin, target (file, bytes, CRC-32), missing, end
+//   take.rfa/journal.jsonl             one fsynced line an event: begin, target (file, bytes, CRC-32), missing, end; chained
 //   take.rfa/lights.lp                 the lamps as lamp_000 ... and their directions, for other programs
 //   take.rfa/cam0/target_000000.exr    tiled, scene-linear, parts: "lamps" (layers lamp_000.Y, or .R .G .B),
 //                                      "mask" (Y, UINT, MaskBit), "variance" (Y, FLOAT; left out when not known),
@@ -127,15 +127,51 @@ struct TargetEntry {
 // "target 3", or of a run "targets 3 to 9".
 std::string target_words(const TargetEntry& entry);
 
+// What a finished target's file is held against before it is read. Its header is always read and checked against the manifest, and
+// its size against the journal.
+enum class TargetCheck {
+    size,      // nothing more: a head costs a few kilobytes, and changed samples go unnoticed
+    checksum,  // all its bytes, against the journal's CRC-32: the file is read once more, from the system's cache
+};
+
+// One finished target, open for reading. The ArchiveReader that it comes from must live as long.
+class TargetReader {
+  public:
+    // Everything but its samples: size, colour filter, missing lamps, provenance, times of its motion, frames of its matte.
+    const Target& head() const;
+
+    // How many rows, whole tiles, can be read at once so that their lamps take no more than 512 MB.
+    int strip_rows() const;
+
+    // A part of it, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels. Memory: the box times
+    // lamps * planes * 4 bytes, and as much again while it is cut from its tiles.
+    Result<Target> read_box(const Box& box) const;
+    Result<Target> read() const;
+
+    // The motion, which no other call reads; an error where it has none.
+    Result<TargetMotion> read_motion() const;
+
+    TargetReader(TargetReader&&) noexcept;
+    ~TargetReader();
+
+  private:
+    friend class ArchiveReader;
+    struct State;
+    explicit TargetReader(std::unique_ptr<State>);
+    std::unique_ptr<State> state_;
+};
+
 // What verify found: finished targets whose files are as the journal says, and one line for everything else.
 struct Verification {
     std::vector<std::string> intact;    // files, relative to the archive
     std::vector<std::string> problems;  // each names its file: damaged, never finished, left over
+    std::vector<std::string> notes;     // what could not be checked
 };
 
 class ArchiveReader {
   public:
-    // Opens finished and unfinished archives alike: a torn last journal line and leftovers are verify's to tell.
+    // Opens finished and unfinished archives alike: a torn last journal line and leftovers are verify's to tell. Only regular
+    // files in the archive's own folder are read.
     static Result<ArchiveReader> open(const std::string& path);
 
     const TakeInfo& info() const;
@@ -143,23 +179,23 @@ class ArchiveReader {
     const std::vector<TargetEntry>& targets() const;  // finished and missing, by camera and index
     // Runs of targets that were to come and are neither: the recording was interrupted. Empty if how many is not known.
     std::vector<TargetEntry> undecided() const;
-    bool finished() const;       // the journal has its end
-    bool being_written() const;  // by a process that lives; false once finished
+    bool finished() const;                                     // the journal has its end
+    bool being_written() const;                                // by a process that lives; false once finished
+    const std::vector<std::string>& journal_problems() const;  // lines that are not as they were written
 
-    // Everything of a target but its samples: size, colour filter, missing lamps, provenance, times of its motion.
+    // Errors: there is no such target or it is missing; its file is gone, no regular file, not as the journal says, of another
+    // target, or no target of this archive (archive/target_header.hpp). Each names the file.
+    Result<TargetReader> open_target(uint32_t camera, uint32_t index, TargetCheck check = TargetCheck::checksum) const;
+
+    // The same in one call, each with its own check; read_head() checks the size alone.
     Result<Target> read_head(uint32_t camera, uint32_t index) const;
-
-    // Reads one finished target with all its lamps: width * height * lamps * planes * 4 bytes.
     Result<Target> read_target(uint32_t camera, uint32_t index) const;
-
-    // A part of a target, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels.
     Result<Target> read_box(uint32_t camera, uint32_t index, const Box& box) const;
-
-    // The motion of a finished target, which no other call reads; an error where it has none.
     Result<TargetMotion> read_motion(uint32_t camera, uint32_t index) const;
 
-    // Compares every file with the journal's size and checksum and opens it.
-    Verification verify() const;
+    // Compares every file with the journal's size and checksum, and opens each target. `deep`: and decodes every sample of every
+    // part, each of which must be a value that it may have.
+    Verification verify(bool deep = false) const;
 
     ArchiveReader(ArchiveReader&&) noexcept;
     ~ArchiveReader();

@@ -30,24 +30,29 @@ int open_folder(const fs::path& folder) {
     return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
-// Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive.
-bool belongs_to_archive(std::string relative) {
+// Whether a file or folder is one that an archive consists of, finished or not, by its path relative to the archive. Links and
+// pipes are none.
+bool belongs_to_archive(std::string relative, const fs::file_status& status) {
+    unsigned folder_camera = 0;
+    if (fs::is_directory(status))
+        return std::sscanf(relative.c_str(), "cam%u", &folder_camera) == 1 &&
+               relative == fmt::format("cam{}", folder_camera);
+    if (!fs::is_regular_file(status)) return false;
     // What is not finished ends with ".part", and where image/whole_file.hpp writes it with a number, too.
     const size_t part = relative.rfind(unfinished_suffix);
     if (part != std::string::npos &&
         relative.find_first_not_of("0123456789-", part + std::strlen(unfinished_suffix)) == std::string::npos)
         relative.resize(part);
     unsigned camera = 0, index = 0;
-    const int numbers = std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index);
-    if (numbers == 2) return relative == target_file_name(camera, index);
-    if (numbers == 1) return relative == fmt::format("cam{}", camera);
+    if (std::sscanf(relative.c_str(), "cam%u/target_%u", &camera, &index) == 2)
+        return relative == target_file_name(camera, index);
     return relative == manifest_name || relative == lights_name || relative == journal_name;
 }
 
 Status check_for_strangers(const fs::path& folder) {
     std::error_code error;
     for (const auto& entry : fs::recursive_directory_iterator(folder, error))
-        if (!belongs_to_archive(entry.path().lexically_relative(folder).generic_string()))
+        if (!belongs_to_archive(entry.path().lexically_relative(folder).generic_string(), entry.symlink_status(error)))
             return fail("'" + entry.path().string() + "' is not part of an archive: move it before overwriting '" +
                         folder.string() + "'");
     if (error) return fail("cannot look into '" + folder.string() + "': " + error.message());

@@ -3,14 +3,17 @@
 #include "archive/disk.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
+#include <libdeflate.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <utility>
-#include <vector>
+
+#include "archive/archive_file.hpp"
 
 namespace ols {
 
@@ -94,26 +97,30 @@ Status ReservedFile::write(const std::string& path, const std::string& text) {
     return rename_durably(name, path);
 }
 
+std::string hex_of(uint32_t crc32) {
+    return fmt::format("{:08x}", crc32);
+}
+
+std::optional<uint32_t> crc32_from_hex(std::string_view digits) {
+    if (digits.size() != 8 || digits.find_first_not_of("0123456789abcdef") != digits.npos) return std::nullopt;
+    uint32_t crc32 = 0;
+    std::from_chars(digits.data(), digits.data() + digits.size(), crc32, 16);
+    return crc32;
+}
+
+uint32_t crc32_of(uint32_t before, const void* bytes, size_t count) {
+    return libdeflate_crc32(before, bytes, count);
+}
+
 Checksum checksum_text(const std::string& text) {
-    return {text.size(), uint32_t(crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size()))};
+    return {text.size(), crc32_of(0, text.data(), text.size())};
 }
 
 Result<Checksum> checksum_file(const std::string& path) {
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return disk_error("read", path, errno);
-    std::vector<Bytef> buffer(1 << 20);
-    Checksum sum;
-    ssize_t n;
-    while ((n = ::read(fd, buffer.data(), buffer.size())) != 0) {
-        if (n < 0 && errno == EINTR) continue;
-        if (n < 0) break;
-        sum.bytes += uint64_t(n);
-        sum.crc32 = uint32_t(crc32_z(sum.crc32, buffer.data(), size_t(n)));
-    }
-    const int error = n < 0 ? errno : 0;
-    ::close(fd);
-    if (error != 0) return disk_error("read", path, error);
-    return sum;
+    const std::filesystem::path place = path;
+    const auto file = ArchiveFile::open(place.parent_path().empty() ? "." : place.parent_path(), place.filename());
+    if (!file) return file.error();
+    return file->checksum();
 }
 
 }  // namespace ols

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "result.hpp"
 
@@ -51,6 +53,13 @@ struct Checksum {
 
     friend bool operator==(const Checksum&, const Checksum&) = default;
 };
+
+// A CRC-32 as it is written: eight digits 0-9 a-f.
+std::string hex_of(uint32_t crc32);
+std::optional<uint32_t> crc32_from_hex(std::string_view digits);
+
+// The CRC-32 of `count` more bytes behind those whose CRC-32 is `before`; 0 for none.
+uint32_t crc32_of(uint32_t before, const void* bytes, size_t count);
 
 Checksum checksum_text(const std::string& text);
 Result<Checksum> checksum_file(const std::string& path);

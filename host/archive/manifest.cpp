@@ -6,6 +6,11 @@
 
 #include <cmath>
 #include <cstdio>
+#include <initializer_list>
+#include <limits>
+#include <utility>
+
+#include "image/json_object.hpp"
 
 namespace ols {
 
@@ -33,34 +38,102 @@ nlohmann::json manifest_of(const TakeInfo& info) {
         {"extra", info.extra}};
 }
 
-Result<TakeInfo> take_info_of(const nlohmann::json& manifest, const std::string& path) {
-    if (!manifest.is_object() || manifest.value("format", json()) != archive_format)
-        return fail("'" + path + "' is not the manifest of an archive: choose the take.rfa directory itself");
-    try {
-        if (manifest.at("version").get<int>() > archive_version)
-            return fail("'" + path + "' is of a later version: read it with the release that wrote it, or a newer one");
-        TakeInfo info;
-        const json& slate = manifest.at("slate");
-        info.production = slate.at("production");
-        info.scene = slate.at("scene");
-        info.take = slate.at("take");
-        info.notes = slate.at("notes");
-        info.timecode_start = manifest.at("timecode_start");
-        info.frame_rate_hz = manifest.at("frame_rate_hz");
-        info.basis = manifest.at("basis");
-        info.value_unit = manifest.at("value_unit");
-        info.color_interop_id = manifest.at("color_interop_id");
-        info.sample_type = manifest.at("sample_type") == "half" ? SampleType::half_float : SampleType::single_float;
-        info.compression = manifest.at("compression") == "none" ? Compression::none : Compression::zips;
-        for (const json& light : manifest.at("lights")) {
-            const auto d = light.at("direction").get<std::array<double, 3>>();
-            info.lights.push_back({light.at("name"), {d[0], d[1], d[2]}});
+namespace {
+
+constexpr double frame_rate_hz_max = 1e6;
+
+std::vector<LightPosition> read_lights(JsonObject& json) {
+    std::vector<JsonObject> entries = json.objects("lights");
+    if (entries.empty()) json.reject("lights", "has no lamp");
+    std::vector<LightPosition> lights;
+    for (JsonObject& entry : entries) {
+        if (const auto layer = lamp_layer(int(lights.size()), int(entries.size())); entry.text("layer") != layer)
+            entry.reject("layer", "is not '" + layer + "'");
+        const std::vector<double> d = entry.numbers("direction");
+        // Written with all digits; read as other programs may have rounded them.
+        if (d.size() != 3 || !(std::abs(std::hypot(d[0], d[1], d[2]) - 1) < 1e-3)) {
+            entry.reject("direction", "is not three numbers of length 1");
+            return lights;
         }
-        info.extra = manifest.value("extra", json::object());
-        return info;
-    } catch (const json::exception& e) {
-        return fail("'" + path + "' is damaged: " + e.what());
+        lights.push_back({entry.text("name"), {d[0], d[1], d[2]}});
     }
+    return lights;
+}
+
+template <typename T>
+T read_choice(JsonObject& json, const char* key, std::initializer_list<std::pair<const char*, T>> choices) {
+    const std::string word = json.text(key);
+    std::string known;
+    for (const auto& [name, choice] : choices) {
+        if (word == name) return choice;
+        known += (known.empty() ? "'" : ", '") + std::string(name) + "'";
+    }
+    json.reject(key, "is none of " + known);
+    return {};
+}
+
+TakeInfo read_info(JsonObject& json) {
+    TakeInfo info;
+    JsonObject slate = json.object("slate");
+    info.production = slate.text("production");
+    info.scene = slate.text("scene");
+    info.take = slate.text("take");
+    info.notes = slate.text("notes");
+    info.timecode_start = json.text("timecode_start");
+    info.frame_rate_hz = json.number("frame_rate_hz", 0, frame_rate_hz_max);
+    if (!(info.frame_rate_hz > 0)) json.reject("frame_rate_hz", "is not above 0");
+    if (!info.timecode_start.empty())
+        if (const auto frames = timecode_frames(info.timecode_start, info.frame_rate_hz); !frames)
+            json.reject("timecode_start", "is no time: " + frames.error().message);
+    info.basis = json.text("basis");
+    info.value_unit =
+        read_choice<std::string>(json, "value_unit", {{"reflectance", "reflectance"}, {"pixel", "pixel"}});
+    info.color_interop_id = json.text("color_interop_id");
+    info.sample_type = read_choice<SampleType>(json, "sample_type",
+                                               {{"half", SampleType::half_float}, {"float", SampleType::single_float}});
+    info.compression =
+        read_choice<Compression>(json, "compression", {{"none", Compression::none}, {"zips", Compression::zips}});
+    info.lights = read_lights(json);
+    info.extra = json.any("extra");
+    if (!info.extra.is_object()) json.reject("extra", "is not an object");
+    return info;
+}
+
+// What finish() says of the targets: how many were written, and runs of those that are missing.
+void read_targets(JsonObject targets, Manifest& manifest) {
+    constexpr uint64_t number_max = std::numeric_limits<uint32_t>::max();
+    manifest.written = targets.count("written", number_max);
+    manifest.missing = 0;
+    for (JsonObject& run : targets.objects("missing")) {
+        (void)run.count("camera", number_max);
+        (void)run.text("why");
+        if (run.has("detail")) (void)run.any("detail");
+        const uint64_t first = run.count("index", number_max);
+        const uint64_t last = run.has("through") ? run.count("through", number_max) : first;
+        if (last < first) run.reject("through", "comes before index");
+        *manifest.missing += last - first + 1;
+    }
+}
+
+}  // namespace
+
+Result<Manifest> read_manifest(const std::string& text, const std::string& path) {
+    auto parsed = parse_json(text, "'" + path + "'");
+    if (!parsed) return parsed.error();
+    if (!parsed->is_object() || parsed->value("format", json()) != archive_format)
+        return fail("'" + path + "' is not the manifest of an archive: choose the take.rfa directory itself");
+    Manifest manifest;
+    manifest.json = std::move(*parsed);
+    JsonObject json(manifest.json, "'" + path + "'");
+    (void)json.text("format");
+    manifest.version = int(json.count("version", std::numeric_limits<int>::max()));
+    if (manifest.version > archive_version)
+        return fail("'" + path + "' is of a later version: read it with the release that wrote it, or a newer one");
+    if (manifest.version < oldest_archive_version) json.reject("version", "is none that there was");
+    manifest.info = read_info(json);
+    if (json.has("targets")) read_targets(json.object("targets"), manifest);
+    if (const Status whole = json.finish(); !whole) return whole.error();
+    return manifest;
 }
 
 std::string lamp_layer(int lamp, int count) {

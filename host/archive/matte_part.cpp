@@ -61,15 +61,23 @@ void write_matte_tiles(Imf::TiledOutputPart part, const TargetMatte& matte) {
     part.writeTiles(0, part.numXTiles() - 1, 0, part.numYTiles() - 1);
 }
 
+std::map<std::string, Imf::PixelType> matte_channels(int planes, bool has_variance) {
+    std::map<std::string, Imf::PixelType> channels;
+    for (size_t plane = 0; plane < size_t(planes); ++plane) channels[plane_channel(plane, size_t(planes))] = Imf::FLOAT;
+    if (has_variance) channels[variance_channel] = Imf::FLOAT;
+    return channels;
+}
+
+bool has_matte_variance(const Imf::Header& header) {
+    return header.channels().findChannel(variance_channel) != nullptr;
+}
+
 Result<TargetMatte> matte_head(const Imf::Header& header, int planes) {
     TargetMatte matte;
     const auto* frames = header.findTypedAttribute<Imf::IntAttribute>(frames_attribute);
-    if (!frames || frames->value() < 1) return fail("its matte does not say how many frames it is of");
+    if (!frames || frames->value() < 1) return fail("does not say how many frames it is of");
     matte.frames = frames->value();
     matte.planes.resize(size_t(planes));
-    for (size_t plane = 0; plane < matte.planes.size(); ++plane)
-        if (!header.channels().findChannel(plane_channel(plane, matte.planes.size())))
-            return fail(std::string("its matte has no channel ") + plane_channel(plane, matte.planes.size()));
     return matte;
 }
 
@@ -81,7 +89,7 @@ Imf::FrameBuffer matte_buffer(TargetMatte& matte, const Imf::Header& header, int
     };
     for (size_t plane = 0; plane < matte.planes.size(); ++plane)
         add(plane_channel(plane, matte.planes.size()), matte.planes[plane]);
-    if (header.channels().findChannel(variance_channel)) add(variance_channel, matte.variance);
+    if (has_matte_variance(header)) add(variance_channel, matte.variance);
     return buffer;
 }
 

@@ -4,7 +4,11 @@
 
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfPixelType.h>
 #include <ImfTiledOutputPart.h>
+
+#include <map>
+#include <string>
 
 #include "image/target_matte.hpp"
 #include "result.hpp"
@@ -20,7 +24,12 @@ void add_matte_channels(Imf::Header& header, const TargetMatte& matte);
 // Throws what OpenEXR throws.
 void write_matte_tiles(Imf::TiledOutputPart part, const TargetMatte& matte);
 
-// What the header says: the number of frames, and empty planes, as many as there are; an error where it is damaged.
+// The channels of a part of so many planes.
+std::map<std::string, Imf::PixelType> matte_channels(int planes, bool has_variance);
+bool has_matte_variance(const Imf::Header& header);
+
+// What the header says: the number of frames, and empty planes, as many as there are. An error, which follows the name of the part,
+// where it is damaged.
 Result<TargetMatte> matte_head(const Imf::Header& header, int planes);
 
 // Makes room for `width` x height pixels and gives the slices to read them with, the first at (x, y).

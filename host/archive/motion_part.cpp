@@ -12,6 +12,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "image/json_object.hpp"
+
 namespace ols {
 
 namespace {
@@ -30,25 +32,28 @@ Imf::Slice slice_of(Imf::PixelType type, const void* samples, const Imath::Box2i
 
 }  // namespace
 
+std::map<std::string, Imf::PixelType> motion_channels(size_t instants) {
+    std::map<std::string, Imf::PixelType> channels;
+    for (size_t i = 0; i < instants; ++i)
+        for (const char* component : {".u", ".v"}) channels[layer(i) + component] = Imf::HALF;
+    return channels;
+}
+
 void add_motion_layers(Imf::Header& header, const std::vector<double>& times_s) {
     header.insert(times_attribute, Imf::StringAttribute(nlohmann::json(times_s).dump()));
-    for (size_t i = 0; i < times_s.size(); ++i)
-        for (const char* component : {".u", ".v"})
-            header.channels().insert(layer(i) + component, Imf::Channel(Imf::HALF));
+    for (const auto& [name, type] : motion_channels(times_s.size())) header.channels().insert(name, Imf::Channel(type));
 }
 
 Result<std::vector<double>> motion_times(const Imf::Header& header) {
     const auto* attribute = header.findTypedAttribute<Imf::StringAttribute>(times_attribute);
-    const auto times = nlohmann::json::parse(attribute ? attribute->value() : "", nullptr, false);
-    if (!times.is_array()) return fail("the times of its motion are not a list");
-    std::vector<double> times_s;
-    for (const auto& time : times) {
-        if (!time.is_number()) return fail("the times of its motion are not numbers");
-        for (const char* component : {".u", ".v"})
-            if (!header.channels().findChannel(layer(times_s.size()) + component))
-                return fail("its motion has no layer '" + layer(times_s.size()) + component + "'");
-        times_s.push_back(time.get<double>());
-    }
+    const auto times = parse_json(attribute ? attribute->value() : "", "has times whose list");
+    if (!times) return times.error();
+    if (!times->is_array() || times->empty() ||
+        !std::ranges::all_of(*times, [](const auto& time) { return time.is_number(); }))
+        return fail("has times that are not a list of numbers");
+    auto times_s = times->get<std::vector<double>>();
+    if (const auto checked = check_motion_times(times_s); !checked)
+        return fail("is damaged: " + checked.error().message);
     return times_s;
 }
 

@@ -3,9 +3,12 @@
 #pragma once
 
 #include <ImfHeader.h>
+#include <ImfPixelType.h>
 #include <ImfTiledInputPart.h>
 #include <ImfTiledOutputPart.h>
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "image/target_motion.hpp"
@@ -16,7 +19,10 @@ namespace ols {
 // Adds the layers instant_000.u, instant_000.v ... and their times to the header of the part.
 void add_motion_layers(Imf::Header& header, const std::vector<double>& times_s);
 
-// The times that add_motion_layers() put there; an error where they are damaged or lack a layer.
+// The channels of a part of so many instants.
+std::map<std::string, Imf::PixelType> motion_channels(size_t instants);
+
+// The times that add_motion_layers() put there, one or more. An error, which follows the name of the part, where they are damaged.
 Result<std::vector<double>> motion_times(const Imf::Header& header);
 
 // Whether half floats, which end at 65504, hold the motion.

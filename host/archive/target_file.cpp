@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Writing and reading of one target through OpenEXR's multi-part files.
+// Writing of one target through OpenEXR's multi-part files.
 #include "archive/target_file.hpp"
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfFramesPerSecond.h>
-#include <ImfMultiPartInputFile.h>
+#include <ImfIntAttribute.h>
 #include <ImfMultiPartOutputFile.h>
 #include <ImfPartType.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
-#include <ImfTiledInputPart.h>
 #include <ImfTiledOutputPart.h>
 #include <fmt/format.h>
 #include <half.h>
@@ -19,37 +18,24 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "archive/exr_stream.hpp"
 #include "archive/manifest.hpp"
 #include "archive/matte_part.hpp"
 #include "archive/motion_part.hpp"
+#include "archive/target_layout.hpp"
+#include "exceptions.hpp"
+#include "image/demosaic.hpp"
+#include "image/json_object.hpp"
 
 namespace ols {
 
 namespace {
 
-constexpr int tile_size = 64;
+using namespace target_layout;
+
 constexpr size_t block_bytes = 64 << 20;
-
-constexpr const char* cfa_names[] = {"none", "rggb", "bggr", "grbg", "gbrg", "rgb"};
-
-std::vector<std::string> plane_channels(int lamps, Cfa cfa) {
-    std::vector<std::string> channels;
-    for (int i = 0; i < lamps; ++i) {
-        const std::string layer = lamp_layer(i, lamps);
-        if (cfa == Cfa::rgb)
-            for (const char* color : {".R", ".G", ".B"}) channels.push_back(layer + color);
-        else
-            channels.push_back(layer + ".Y");
-    }
-    return channels;
-}
-
-Imf::Slice slice_at(Imf::PixelType type, const void* first, const Box& box) {
-    const size_t size = type == Imf::HALF ? sizeof(half) : sizeof(float);
-    return Imf::Slice::Make(type, first, Imath::V2i(box.x, box.y), box.width, box.height, size, size * box.width);
-}
 
 void add_string(Imf::Header& header, const char* name, const std::string& text) {
     header.insert(name, Imf::StringAttribute(text));
@@ -70,15 +56,6 @@ void add_film_attributes(Imf::Header& header, const TakeInfo& info, uint32_t ind
     Imf::addComments(header, info.notes);
 }
 
-std::string lights_text(const TakeInfo& info) {
-    std::string text;
-    for (size_t i = 0; i < info.lights.size(); ++i) {
-        const Vec3 d = info.lights[i].direction;
-        text += fmt::format("{} {:.9f} {:.9f} {:.9f}\n", lamp_layer(int(i), int(info.lights.size())), d.x, d.y, d.z);
-    }
-    return text;
-}
-
 Imf::Header part_header(const TakeInfo& info, const Target& head, const std::string& name) {
     Imf::Header header(head.width, head.height);
     header.setName(name);
@@ -90,35 +67,36 @@ Imf::Header part_header(const TakeInfo& info, const Target& head, const std::str
 }
 
 Imf::Header lamps_header(const TakeInfo& info, const Target& head) {
-    Imf::Header header = part_header(info, head, "lamps");
+    Imf::Header header = part_header(info, head, lamps_part);
     if (info.compression == Compression::none) header.compression() = Imf::NO_COMPRESSION;
-    add_string(header, "colorInteropID", info.color_interop_id);
-    add_string(header, "cfa", cfa_names[int(head.cfa)]);
-    add_string(header, "basis", info.basis);
-    add_string(header, "valueUnit", info.value_unit);
-    add_string(header, "lights", lights_text(info));
-    add_string(header, "missingLamps", nlohmann::json(head.missing_lamps).dump());
-    add_string(header, "provenance", head.provenance.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-    const auto type = info.sample_type == SampleType::half_float ? Imf::HALF : Imf::FLOAT;
+    header.insert(camera_attribute, Imf::IntAttribute(int(head.camera)));
+    header.insert(index_attribute, Imf::IntAttribute(int(head.index)));
+    add_string(header, color_attribute, info.color_interop_id);
+    add_string(header, cfa_attribute, cfa_names[int(head.cfa)]);
+    add_string(header, basis_attribute, info.basis);
+    add_string(header, value_unit_attribute, info.value_unit);
+    add_string(header, lights_attribute, lights_text(info));
+    add_string(header, missing_attribute, json_line(head.missing_lamps));
+    add_string(header, provenance_attribute, json_line(head.provenance));
     for (const auto& channel : plane_channels(int(info.lights.size()), head.cfa))
-        header.channels().insert(channel, Imf::Channel(type));
+        header.channels().insert(channel, Imf::Channel(lamp_type(info)));
     return header;
 }
 
 Imf::Header data_header(const TakeInfo& info, const Target& head, const char* name) {
     Imf::Header header = part_header(info, head, name);
-    add_string(header, "colorInteropID", "data");
+    add_string(header, color_attribute, "data");
     return header;
 }
 
 Imf::Header motion_header(const TakeInfo& info, const Target& head) {
-    Imf::Header header = data_header(info, head, "motion");
+    Imf::Header header = data_header(info, head, motion_part);
     add_motion_layers(header, head.motion.times_s);
     return header;
 }
 
 Imf::Header matte_header(const TakeInfo& info, const Target& head) {
-    Imf::Header header = data_header(info, head, "matte");
+    Imf::Header header = data_header(info, head, matte_part);
     add_matte_channels(header, head.matte);
     return header;
 }
@@ -174,10 +152,10 @@ void write_plane(Imf::TiledOutputPart part, Imf::PixelType type, const void* sam
 }
 
 Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, const PlaneSource& source) {
-    std::vector<Imf::Header> headers = {lamps_header(info, head), plane_header(info, head, "mask", Imf::UINT)};
-    if (!head.variance.empty()) headers.push_back(plane_header(info, head, "variance", Imf::FLOAT));
-    if (!head.noise_gain.empty()) headers.push_back(plane_header(info, head, "noise_gain", Imf::FLOAT));
-    if (!head.confidence.empty()) headers.push_back(plane_header(info, head, "confidence", Imf::FLOAT));
+    std::vector<Imf::Header> headers = {lamps_header(info, head), plane_header(info, head, mask_part, Imf::UINT)};
+    if (!head.variance.empty()) headers.push_back(plane_header(info, head, variance_part, Imf::FLOAT));
+    if (!head.noise_gain.empty()) headers.push_back(plane_header(info, head, noise_gain_part, Imf::FLOAT));
+    if (!head.confidence.empty()) headers.push_back(plane_header(info, head, confidence_part, Imf::FLOAT));
     if (head.matte.frames > 0) headers.push_back(matte_header(info, head));
     if (!head.motion.flows.empty()) headers.push_back(motion_header(info, head));
     std::vector<uint32_t> mask = head.mask;
@@ -200,182 +178,38 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
 
 }  // namespace
 
+namespace {
+
+// What a reader would refuse is not written.
+Status check_target(const TakeInfo& info, const Target& head) {
+    if (const Status size = check_mosaic_size(head.cfa, head.width, head.height); !size) return size;
+    std::set<int> missing;
+    for (const int lamp : head.missing_lamps)
+        if (lamp < 0 || size_t(lamp) >= info.lights.size() || !missing.insert(lamp).second)
+            return fail(fmt::format("lamp {} cannot be missing: there are {}, each once", lamp, info.lights.size()));
+    if (head.provenance.is_object() || head.provenance.is_null()) return Done{};
+    return fail(fmt::format("a target's provenance is an object, not {}", json_kind(head.provenance)));
+}
+
+}  // namespace
+
 std::string target_file_name(uint32_t camera, uint32_t index) {
     return fmt::format("cam{}/target_{:06}.exr", camera, index);
 }
 
 Status write_target_file(const std::string& path, const TakeInfo& info, const Target& head, const PlaneSource& source) {
+    if (auto s = check_target(info, head); !s) return s;
     if (auto s = check_motion(head.motion, head.width, head.height); !s) return s;
     if (auto s = check_motion_range(head.motion); !s) return s;
     if (auto s = check_matte(head.matte, head.planes(), size_t(head.width) * size_t(head.height)); !s) return s;
     ExrStream stream(path);
-    Status written = Done{};
-    try {
-        written = write_parts(stream, info, head, source);
-    } catch (const std::exception& e) {
-        written = fail("cannot write '" + path + "': " + e.what());
-    }
+    const Status written =
+        guarded("cannot write '" + path + "'", [&] { return write_parts(stream, info, head, source); });
     // A disk error is named better by the stream than by what OpenEXR made of it.
     const Status finished = stream.finish();
     if (written.ok() && finished.ok()) return Done{};
     unlink(path.c_str());
     return finished.ok() ? written : finished;
-}
-
-namespace {
-
-int find_part(const Imf::MultiPartInputFile& file, const std::string& name) {
-    for (int i = 0; i < file.parts(); ++i)
-        if (file.header(i).hasName() && file.header(i).name() == name && file.header(i).hasTileDescription()) return i;
-    return -1;
-}
-
-std::string string_attribute(const Imf::Header& header, const char* name) {
-    const auto* attribute = header.findTypedAttribute<Imf::StringAttribute>(name);
-    return attribute ? attribute->value() : "";
-}
-
-Result<Target> head_of(const Imf::MultiPartInputFile& file, const std::string& path, const TakeInfo& info) {
-    const int part = find_part(file, "lamps");
-    if (part < 0 || find_part(file, "mask") < 0)
-        return fail("'" + path + "' has no tiled parts \"lamps\" and \"mask\"");
-    const Imf::Header& header = file.header(part);
-    Target target;
-    const std::string cfa = string_attribute(header, "cfa");
-    const auto found = std::find(std::begin(cfa_names), std::end(cfa_names), cfa);
-    if (found == std::end(cfa_names)) return fail("'" + path + "' has an unknown colour filter '" + cfa + "'");
-    target.cfa = Cfa(found - std::begin(cfa_names));
-    for (const auto& channel : plane_channels(int(info.lights.size()), target.cfa))
-        if (!header.channels().findChannel(channel))
-            return fail(fmt::format("'{}' has no layer '{}', but the manifest lists that lamp", path, channel));
-    const Imath::Box2i& window = header.dataWindow();
-    if (window.min != Imath::V2i(0, 0)) return fail("'" + path + "' has a data window that does not begin at 0, 0");
-    target.width = window.max.x + 1;
-    target.height = window.max.y + 1;
-    for (const char* name : {"mask", "variance", "noise_gain", "confidence", "matte", "motion"})
-        if (const int p = find_part(file, name); p >= 0 && file.header(p).dataWindow() != window)
-            return fail("'" + path + "' has parts of different sizes");
-    target.provenance = nlohmann::json::parse(string_attribute(header, "provenance"), nullptr, false);
-    const auto missing = nlohmann::json::parse(string_attribute(header, "missingLamps"), nullptr, false);
-    if (target.provenance.is_discarded() || !missing.is_array())
-        return fail("'" + path + "' has a damaged header: its provenance or missing lamps are not JSON");
-    for (const auto& lamp : missing) target.missing_lamps.push_back(lamp.get<int>());
-    if (const int p = find_part(file, "motion"); p >= 0) {
-        const auto times_s = motion_times(file.header(p));
-        if (!times_s) return fail("'" + path + "': " + times_s.error().message);
-        target.motion.times_s = *times_s;
-    }
-    if (const int p = find_part(file, "matte"); p >= 0) {
-        auto matte = matte_head(file.header(p), target.planes());
-        if (!matte) return fail("'" + path + "': " + matte.error().message);
-        target.matte = std::move(*matte);
-    }
-    return target;
-}
-
-// Reads the tiles that cover a box: slices begin at the first covering tile, and are cropped after.
-Box covering(const Box& box, const Target& head) {
-    const int x0 = box.x / tile_size * tile_size, y0 = box.y / tile_size * tile_size;
-    const int x1 = std::min(head.width, (box.x + box.width + tile_size - 1) / tile_size * tile_size);
-    const int y1 = std::min(head.height, (box.y + box.height + tile_size - 1) / tile_size * tile_size);
-    return {x0, y0, x1 - x0, y1 - y0};
-}
-
-template <typename Samples>
-void crop(Samples& plane, const Box& from, const Box& to) {
-    if (from.width == to.width && from.height == to.height) return;
-    Samples cropped(size_t(to.width) * to.height);
-    for (int y = 0; y < to.height; ++y)
-        std::copy_n(plane.data() + size_t(y + to.y - from.y) * from.width + (to.x - from.x), to.width,
-                    cropped.data() + size_t(y) * to.width);
-    plane = std::move(cropped);
-}
-
-void read_part(Imf::MultiPartInputFile& file, const std::string& name, const Imf::FrameBuffer& buffer,
-               const Box& tiles) {
-    Imf::TiledInputPart part(file, find_part(file, name));
-    if (part.tileXSize() != tile_size || part.tileYSize() != tile_size)
-        throw std::runtime_error("its tiles are not 64 x 64 pixels");
-    part.setFrameBuffer(buffer);
-    part.readTiles(tiles.x / tile_size, (tiles.x + tiles.width - 1) / tile_size, tiles.y / tile_size,
-                   (tiles.y + tiles.height - 1) / tile_size);
-}
-
-template <typename Sample>
-void read_plane(Imf::MultiPartInputFile& file, const char* name, Imf::PixelType type, std::vector<Sample>& plane,
-                const Box& tiles, const Box& box) {
-    if (find_part(file, name) < 0) return;
-    plane.resize(size_t(tiles.width) * tiles.height);
-    Imf::FrameBuffer buffer;
-    buffer.insert("Y", slice_at(type, plane.data(), tiles));
-    read_part(file, name, buffer, tiles);
-    crop(plane, tiles, box);
-}
-
-void read_matte(Imf::MultiPartInputFile& file, TargetMatte& matte, const Box& tiles, const Box& box) {
-    if (matte.frames == 0) return;
-    const Imf::Header& header = file.header(find_part(file, "matte"));
-    read_part(file, "matte", matte_buffer(matte, header, tiles.x, tiles.y, tiles.width, tiles.height), tiles);
-    for (auto& plane : matte.planes) crop(plane, tiles, box);
-    if (!matte.variance.empty()) crop(matte.variance, tiles, box);
-}
-
-}  // namespace
-
-Result<Target> read_target_head(const std::string& path, const TakeInfo& info) {
-    try {
-        const Imf::MultiPartInputFile file(path.c_str());
-        return head_of(file, path, info);
-    } catch (const std::exception& e) {
-        return fail("cannot read '" + path + "': " + e.what());
-    }
-}
-
-Result<Target> read_target_box(const std::string& path, const TakeInfo& info, Box box) {
-    try {
-        Imf::MultiPartInputFile file(path.c_str());
-        auto head = head_of(file, path, info);
-        if (!head) return head;
-        Target& target = *head;
-        if (box.width == 0) box = {0, 0, target.width, target.height};
-        assert(box.x >= 0 && box.y >= 0 && box.width > 0 && box.height > 0 && box.x + box.width <= target.width &&
-               box.y + box.height <= target.height);
-        const Box tiles = covering(box, target);
-
-        const auto channels = plane_channels(int(info.lights.size()), target.cfa);
-        target.lamps.assign(channels.size(), Plane(size_t(tiles.width) * tiles.height));
-        Imf::FrameBuffer buffer;
-        for (size_t c = 0; c < channels.size(); ++c)
-            buffer.insert(channels[c], slice_at(Imf::FLOAT, target.lamps[c].data(), tiles));
-        read_part(file, "lamps", buffer, tiles);
-        for (auto& plane : target.lamps) crop(plane, tiles, box);
-        read_plane(file, "mask", Imf::UINT, target.mask, tiles, box);
-        read_plane(file, "variance", Imf::FLOAT, target.variance, tiles, box);
-        read_plane(file, "noise_gain", Imf::FLOAT, target.noise_gain, tiles, box);
-        read_plane(file, "confidence", Imf::FLOAT, target.confidence, tiles, box);
-        read_matte(file, target.matte, tiles, box);
-        target.width = box.width;
-        target.height = box.height;
-        return head;
-    } catch (const std::exception& e) {
-        return fail("cannot read '" + path + "': " + e.what());
-    }
-}
-
-Result<TargetMotion> read_target_motion(const std::string& path, const TakeInfo& info) {
-    try {
-        Imf::MultiPartInputFile file(path.c_str());
-        auto head = head_of(file, path, info);
-        if (!head) return head.error();
-        TargetMotion motion = std::move(head->motion);
-        if (motion.times_s.empty()) return fail("'" + path + "' has no motion: the take was made without");
-        motion.flows = read_motion_tiles(Imf::TiledInputPart(file, find_part(file, "motion")), motion.times_s.size());
-        const auto checked = check_motion(motion, head->width, head->height);
-        if (!checked) return fail("'" + path + "': " + checked.error().message);
-        return motion;
-    } catch (const std::exception& e) {
-        return fail("cannot read '" + path + "': " + e.what());
-    }
 }
 
 }  // namespace ols

@@ -122,17 +122,27 @@ std::string text_of(const nlohmann::json& manifest) {
     return manifest.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
+// What a reader will make of it: an archive whose manifest it would refuse is not begun, and its targets' headers say the same.
+Result<TakeInfo> as_read(const TakeInfo& info) {
+    auto manifest = read_manifest(text_of(manifest_of(info)), manifest_name);
+    if (!manifest) return fail("this take cannot be archived: " + manifest.error().message);
+    return std::move(manifest->info);
+}
+
 // Fills the fresh directory; the journal comes last, so that a directory with a journal is an archive.
 Result<JournalWriter> begin_archive(const fs::path& root, const TakeInfo& info) {
     const std::string lights_path = (root / lights_name).string();
     if (auto s = write_lp(lights_path, named_by_layer(info.lights)); !s) return s.error();
     const auto lights = checksum_file(lights_path);
     if (!lights) return lights.error();
-    if (auto s = write_file_durably((root / manifest_name).string(), text_of(manifest_of(info))); !s) return s.error();
+    const std::string manifest = text_of(manifest_of(info));
+    if (auto s = write_file_durably((root / manifest_name).string(), manifest); !s) return s.error();
     auto journal = JournalWriter::create((root / journal_name).string());
     if (!journal) return journal;
-    const auto begun =
-        journal->append({{"event", "begin"}, {"version", archive_version}, {"lights", to_json(*lights)}});
+    const auto begun = journal->append({{"event", "begin"},
+                                        {"version", archive_version},
+                                        {"lights", to_json(*lights)},
+                                        {"manifest", to_json(checksum_text(manifest))}});
     if (!begun) return begun.error();
     if (auto s = sync_directory(root.parent_path().string()); !s) return s.error();
     return journal;
@@ -153,14 +163,16 @@ Result<ArchiveWriter> ArchiveWriter::create(const std::string& path, const TakeI
 
 Result<ArchiveWriter> ArchiveWriter::create_beside(const std::string& path, const TakeInfo& info, bool overwrite) {
     if (const auto checked = check_info(info); !checked) return checked.error();
+    const auto read_back = as_read(info);
+    if (!read_back) return read_back.error();
     auto place = ArchivePlace::make_beside(path, overwrite);
     if (!place) return place.error();
-    auto journal = begin_archive(place->folder(), info);
+    auto journal = begin_archive(place->folder(), *read_back);
     if (!journal) return journal.error();
     auto manifest = ReservedFile::create((place->folder() / manifest_name).string(), manifest_room);
     if (!manifest) return manifest.error();
     return ArchiveWriter(
-        std::unique_ptr<State>(new State{std::move(*place), info, std::move(*journal), std::move(*manifest)}));
+        std::unique_ptr<State>(new State{std::move(*place), *read_back, std::move(*journal), std::move(*manifest)}));
 }
 
 Status ArchiveWriter::take_place() {

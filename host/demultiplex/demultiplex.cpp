@@ -15,12 +15,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "demultiplex/fill_model.hpp"
 #include "demultiplex/hadamard_tile.hpp"
 #include "demultiplex/scaled_row.hpp"
+#include "worker_threads.hpp"
 
 namespace ols {
 
@@ -33,14 +33,10 @@ constexpr size_t block_samples = 8 * tile_samples;
 template <typename MakeWorker>
 void for_each_block(size_t samples, size_t block, int threads, const MakeWorker& make_worker) {
     std::atomic<size_t> next{0};
-    const auto run = [&] {
+    run_workers(thread_count(threads), [&](int) {
         auto work = make_worker();
         for (size_t begin; (begin = next.fetch_add(block)) < samples;) work(begin, std::min(block, samples - begin));
-    };
-    if (threads <= 0) threads = std::max(1, int(std::thread::hardware_concurrency()));
-    std::vector<std::jthread> others;
-    for (int t = 1; t < threads; ++t) others.emplace_back(run);
-    run();
+    });
 }
 
 std::vector<float> sample_factors(const Basis& basis, size_t samples, const DemultiplexOptions& options) {

@@ -2,6 +2,8 @@
 // Malvar, He and Cutler's demosaicing filters.
 #include "image/demosaic.hpp"
 
+#include <fmt/format.h>
+
 #include <cassert>
 #include <cstdlib>
 
@@ -57,6 +59,11 @@ float color_down(const Neighborhood& n) {
 }
 
 }  // namespace
+
+Status check_mosaic_size(Cfa cfa, int width, int height) {
+    if (cfa == Cfa::none || cfa == Cfa::rgb || (width >= 2 && height >= 2)) return Done{};
+    return fail(fmt::format("a mosaic of {} x {} pixels does not hold all its colours: it takes 2 x 2", width, height));
+}
 
 Image demosaic(const Image& mosaic, Cfa cfa) {
     assert(mosaic.channels == 1 && mosaic.width >= 2 && mosaic.height >= 2);

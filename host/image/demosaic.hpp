@@ -4,8 +4,12 @@
 #pragma once
 
 #include "image/frame.hpp"
+#include "result.hpp"
 
 namespace ols {
+
+// An error where a picture is a mosaic and too small to hold all its colours.
+Status check_mosaic_size(Cfa cfa, int width, int height);
 
 // Turns one channel of at least 2 x 2 pixels with one of the four Bayer patterns into three channels. Values of any sign and size pass; the
 // colour that a pixel was seen in stays as it was. Borders are mirrored about the outermost pixel, which keeps the

@@ -15,6 +15,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "exceptions.hpp"
 #include "image/whole_file.hpp"
 
 namespace ols {
@@ -69,7 +70,7 @@ Status write_exr(const std::string& path, const Image& image, ExrType type,
     try {
         return write_whole_file(path, encoded(image, type, attributes));
     } catch (const std::exception& e) {
-        return fail("cannot write '" + path + "': " + e.what());
+        return fail("cannot write '" + path + "': " + words_of(e));
     }
 }
 

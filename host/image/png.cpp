@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "exceptions.hpp"
 #include "image/tone.hpp"
 #include "image/whole_file.hpp"
 
@@ -21,7 +22,7 @@ Status write_png(const std::string& path, int width, int height, std::span<const
         cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
         cv::imencode(".png", bgr, encoded);
     } catch (const cv::Exception& e) {
-        return fail("cannot write '" + path + "': " + e.what());
+        return fail("cannot write '" + path + "': " + words_of(e));
     }
     return write_whole_file(path, std::string_view(reinterpret_cast<const char*>(encoded.data()), encoded.size()));
 }

@@ -7,9 +7,7 @@
 
 namespace ols {
 
-namespace {
-
-Status check_times(const std::vector<double>& times_s) {
+Status check_motion_times(const std::vector<double>& times_s) {
     for (size_t i = 0; i < times_s.size(); ++i)
         if (!std::isfinite(times_s[i]) || times_s[i] == 0 || (i > 0 && !(times_s[i] > times_s[i - 1])))
             return fail(fmt::format(
@@ -18,10 +16,8 @@ Status check_times(const std::vector<double>& times_s) {
     return Done{};
 }
 
-}  // namespace
-
 Status check_motion(const TargetMotion& motion, int width, int height) {
-    if (const auto checked = check_times(motion.times_s); !checked) return checked;
+    if (const auto checked = check_motion_times(motion.times_s); !checked) return checked;
     if (motion.flows.size() != motion.times_s.size())
         return fail(fmt::format("a target's motion has {} times and {} flow fields: each time needs one",
                                 motion.times_s.size(), motion.flows.size()));

@@ -15,7 +15,10 @@ struct TargetMotion {
     std::vector<FlowField> flows;  // one an instant: what the target shows at (x, y) is at (x + u, y + v) then
 };
 
-// Errors: times that do not ascend, are 0 or not finite; flows that are not as many as times, not of the target's size, or
+// Errors: times that do not ascend, are 0 or not finite.
+Status check_motion_times(const std::vector<double>& times_s);
+
+// Errors: those of the times; flows that are not as many as times, not of the target's size, or
 // not finite.
 Status check_motion(const TargetMotion& motion, int width, int height);
 

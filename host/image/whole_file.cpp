@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "exceptions.hpp"
+
 namespace ols {
 
 namespace {
@@ -127,7 +129,7 @@ Status write_whole_file(const std::string& path, const std::function<Status(cons
     if (!place) return place.error();
     const std::string temporary = reserve_beside(*place, make_file);
     if (temporary.empty()) return cannot_write(path, errno);
-    Status done = write(temporary);
+    Status done = guarded("cannot write '" + path + "'", [&] { return write(temporary); });
     if (done)
         if (const int error = write_and_sync(temporary, {}); error != 0) done = cannot_write(path, error);
     if (done && rename(temporary.c_str(), place->c_str()) != 0) done = cannot_write(path, errno);
@@ -147,7 +149,7 @@ Status make_whole_folder(const std::string& path, const std::function<Status(con
     if (!place) return place.error();
     const std::string temporary = reserve_beside(*place, make_folder);
     if (temporary.empty()) return cannot_write(path, errno);
-    Status done = fill(temporary);
+    Status done = guarded("cannot write '" + path + "'", [&] { return fill(temporary); });
     // A folder that came to stand there meanwhile stays, unless it is empty.
     if (done && rename(temporary.c_str(), place->c_str()) != 0) done = cannot_write(path, errno);
     std::error_code ignored;

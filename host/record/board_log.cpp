@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "device/log_reader.hpp"
+#include "exceptions.hpp"
 
 namespace ols {
 
@@ -43,7 +44,10 @@ BoardLog::BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uin
       arrivals_(arrivals),
       why_stop_(std::move(why_stop)),
       on_news_(std::move(on_news)) {
-    thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
+    thread_ = std::thread([this, on_end = std::move(on_end)] {
+        auto end = guarded("the board's log cannot be followed", [this] { return Result<LogEnd>(follow()); });
+        on_end(end ? std::move(*end) : LogEnd{end.error().message, true});
+    });
 }
 
 BoardLog::~BoardLog() {

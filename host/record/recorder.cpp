@@ -11,6 +11,7 @@
 #include <unordered_map>
 #include <variant>
 
+#include "exceptions.hpp"
 #include "record/board_log.hpp"
 #include "record/event_queue.hpp"
 
@@ -74,7 +75,10 @@ class CameraReader {
           black_counts_(black_counts),
           room_(std::make_shared<Room>(ptrdiff_t(frames_max))),
           queue_(queue) {
-        thread_ = std::thread([this] { read(); });
+        thread_ = std::thread([this] {
+            const Status done = guarded("the camera cannot be read", [this] { return read(), Status(Done{}); });
+            if (!done) queue_.push(CameraPause{0, {CameraState::gone, done.error().message}});
+        });
     }
     ~CameraReader() {
         end_ = true;

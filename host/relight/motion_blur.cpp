@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <thread>
 
 #include "relight/moved_sheet.hpp"
+#include "worker_threads.hpp"
 
 namespace ols {
 
@@ -72,16 +72,11 @@ class Blurrer {
     }
 
     BlurredImage run(int threads) {
-        if (threads <= 0) threads = int(std::max(1u, std::thread::hardware_concurrency()));
         std::atomic<int> next = 0;
         std::atomic<size_t> unseen = 0;
-        const auto work = [&] {
+        run_workers(thread_count(threads), [&](int) {
             for (int tile; (tile = next++) < columns_ * rows_;) unseen += blur_tile(tile);
-        };
-        std::vector<std::thread> others;
-        for (int t = 1; t < threads; ++t) others.emplace_back(work);
-        work();
-        for (auto& thread : others) thread.join();
+        });
         return {std::move(blurred_), path_.extrapolated_s, unseen};
     }
 

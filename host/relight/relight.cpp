@@ -8,7 +8,8 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
-#include <thread>
+
+#include "worker_threads.hpp"
 
 namespace ols {
 
@@ -40,18 +41,14 @@ class Relighter {
     }
 
     RelitImage run(int threads) {
-        if (threads <= 0) threads = int(std::max(1u, std::thread::hardware_concurrency()));
+        threads = thread_count(threads);
         std::atomic<int> next_row = 0;
         std::vector<std::vector<size_t>> left_out(threads, std::vector<size_t>(olat_.lamps()));
-        const auto work = [&](int thread) {
+        run_workers(threads, [&](int worker) {
             std::vector<float> sums(size_t(outputs_) * rows_per_block_ * olat_.width);
             for (int y; (y = next_row.fetch_add(rows_per_block_)) < olat_.height;)
-                relight_rows(y, std::min(y + rows_per_block_, olat_.height), sums, left_out[thread]);
-        };
-        std::vector<std::thread> others;
-        for (int t = 1; t < threads; ++t) others.emplace_back(work, t);
-        work(0);
-        for (auto& thread : others) thread.join();
+                relight_rows(y, std::min(y + rows_per_block_, olat_.height), sums, left_out[worker]);
+        });
         result_.left_out_samples.assign(olat_.lamps(), 0);
         for (const auto& counts : left_out)
             for (int lamp = 0; lamp < olat_.lamps(); ++lamp) result_.left_out_samples[lamp] += counts[lamp];

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "exceptions.hpp"
 #include "take/provenance.hpp"
 
 namespace ols {
@@ -113,7 +114,8 @@ void CameraDeveloper::develop() {
 TargetOutcome CameraDeveloper::develop(const Job& job) {
     TargetOutcome outcome{camera_, job.index, nullptr, "", {}};
     outcome.detail = std::visit([&](const auto& frames) { return provenance_of(frames, take_.sequence); }, job.frames);
-    auto target = std::visit([&](const auto& frames) { return develop(frames); }, job.frames);
+    auto target = guarded("cannot develop it",
+                          [&] { return std::visit([&](const auto& frames) { return develop(frames); }, job.frames); });
     if (!target.ok()) {
         outcome.why = target.error().message;
         if (!job.lost_by.empty()) outcome.why += "; the first was lost because: " + job.lost_by;

@@ -6,6 +6,8 @@
 
 #include <chrono>
 
+#include "exceptions.hpp"
+
 namespace ols {
 
 TargetWriter::Report TargetWriter::finish() {
@@ -17,7 +19,9 @@ TargetWriter::Report TargetWriter::finish() {
 void TargetWriter::write() {
     while (const auto work = work_.pop()) {
         const auto start = std::chrono::steady_clock::now();
-        const Status status = std::visit([this](const auto& one) { return write(one); }, *work);
+        const Status status = guarded("cannot write to the archive", [&] {
+            return std::visit([this](const auto& one) { return write(one); }, *work);
+        });
         if (!status.ok() && report_.error.empty()) report_.error = status.error().message;
         report_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     }

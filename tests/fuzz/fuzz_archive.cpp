@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Fuzzes the reader of archives: a journal of any bytes beside a good manifest, or a good manifest changed by any JSON
-// merge patch. It opens or says why not, verifies, and never calls a target intact, for there is none.
+// Fuzzes the reader of archives: a journal of any bytes beside a good manifest, one of any lines whose chain is made right, a
+// good manifest changed by any JSON merge patch, or one of any bytes. It opens or says why not, verifies, and never calls a target
+// intact, for there is none.
 // links: ols_archive
+// smoke: 6000
 #include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "archive/archive.hpp"
+#include "archive/journal.hpp"
 
 namespace {
 
@@ -24,6 +28,17 @@ std::string read_text(const std::string& path) {
 
 void write_text(const std::string& path, const std::string& text) {
     std::ofstream(path, std::ios::binary) << text;
+}
+
+// Each line without its last brace, and with its chain.
+std::string chained(const std::string& lines) {
+    std::string text;
+    std::istringstream stream(lines);
+    for (std::string line; std::getline(stream, line);) {
+        text += line.substr(0, line.size() - line.ends_with('}'));
+        text += ols::chain_text(ols::crc32_of(0, text.data(), text.size())) + "\n";
+    }
+    return text;
 }
 
 struct GoodArchive {
@@ -47,21 +62,23 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
     static const GoodArchive good;
     if (size == 0) return 0;
     const std::string input(reinterpret_cast<const char*>(bytes) + 1, size - 1);
-    const bool fuzz_journal = bytes[0] % 2 == 0;
-    if (fuzz_journal) {
-        write_text(good.path + "/manifest.json", good.manifest);
-        write_text(good.path + "/journal.jsonl", input);
-    } else {
+    write_text(good.path + "/manifest.json", good.manifest);
+    write_text(good.path + "/journal.jsonl", good.journal);
+    const int kind = bytes[0] % 4;
+    if (kind == 0) write_text(good.path + "/journal.jsonl", input);
+    if (kind == 1) write_text(good.path + "/journal.jsonl", chained(input));
+    if (kind == 2) write_text(good.path + "/manifest.json", input);
+    if (kind == 3) {
         auto manifest = nlohmann::json::parse(good.manifest);
         const auto patch = nlohmann::json::parse(input, nullptr, false);
         if (patch.is_discarded()) return 0;
         manifest.merge_patch(patch);
-        write_text(good.path + "/manifest.json", manifest.dump());
-        write_text(good.path + "/journal.jsonl", good.journal);
+        write_text(good.path + "/manifest.json",
+                   manifest.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
     }
     const auto archive = ols::ArchiveReader::open(good.path);
     if (!archive) {
-        expect(!fuzz_journal && !archive.error().message.empty());
+        expect(kind >= 2 && !archive.error().message.empty());
         return 0;
     }
     expect(archive->verify().intact.empty());

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Builds every fuzzer of this folder and runs it.
-#   run.sh smoke          earlier findings (tests/fuzz/found) and a fixed number of inputs from a fixed seed
+#   run.sh smoke          earlier findings (tests/fuzz/found) and a fixed number of inputs from a fixed seed: 20000,
+#                         or what the fuzzer's file says (// smoke: 2000)
 #   run.sh SECONDS        as long, from a new seed, on top of what earlier runs learnt (build/fuzz/corpus)
 # New findings are kept in build/fuzz/found.
 set -euo pipefail
@@ -32,7 +33,8 @@ for fuzzer in "${fuzzers[@]}"; do
     findings=("$root/tests/fuzz/found/$fuzzer-"*)
     if ((${#findings[@]})); then run "$fuzzer" "${findings[@]}"; fi
     if [[ $budget == smoke ]]; then
-        run "$fuzzer" -seed=1 -runs=20000
+        runs=$(sed -n 's|^// smoke: ||p' "$root/tests/fuzz/$fuzzer.cpp")
+        run "$fuzzer" -seed=1 -runs="${runs:-20000}"
     else
         mkdir -p "$build/corpus/$fuzzer"
         run "$fuzzer" -max_total_time="$budget" "$build/corpus/$fuzzer"

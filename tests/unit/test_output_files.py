@@ -12,6 +12,8 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from chained_journal import chained, checksum, with_index
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build/host/bin"
 SCENE = ROOT / "tools/stagesim/scenes/card.toml"
@@ -136,12 +138,13 @@ def add_targets(take):
     end = journal.pop()
     for index in (1, 3):
         file = f"cam0/target_{index:06}.exr"
-        (take / file).write_bytes((take / target["file"]).read_bytes())
-        journal.append(target | {"index": index, "file": file})
+        data = with_index((take / target["file"]).read_bytes(), index)
+        (take / file).write_bytes(data)
+        journal.append(target | checksum(data) | {"index": index, "file": file})
     journal.append({"event": "missing", "camera": 0, "index": 2, "why": "lost", "detail": None})
     journal.append({"event": "missing", "camera": 0, "index": 4, "through": 9, "why": "stopped"})
     journal.append({"event": "expect", "camera": 0, "targets": 12})
-    (take / "journal.jsonl").write_text("".join(json.dumps(line) + "\n" for line in [*journal, end]))
+    (take / "journal.jsonl").write_bytes(chained([*journal, end | {"written": 3, "missing": 7}]))
 
 
 def test_all_targets_are_exported_under_the_names_that_relight_gives_them(take, tmp_path):

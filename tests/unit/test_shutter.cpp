@@ -50,7 +50,8 @@ TEST_F(Shutter, blurs_by_the_archives_motion_at_its_frame_rate) {
     ASSERT_TRUE(writer->write_target(moving_target(0)).ok());
     const auto archive = ArchiveReader::open(path);
     const ShutterOptions options{.angle_deg = 180, .step_px = 0.1};
-    const auto blurred = through_shutter(*archive, archive->targets()[0], line_at(20), options, 1);
+    const auto blurred =
+        through_shutter(*archive->open_target(0, 0), "target", archive->info().frame_rate_hz, line_at(20), options, 1);
     ASSERT_TRUE(blurred.ok()) << blurred.error().message;
     // Half a frame is 6 pixels: 17 to 23.
     for (int c = 0; c < 4; ++c) {
@@ -65,7 +66,8 @@ TEST_F(Shutter, an_exposure_beyond_the_known_motion_is_told) {
     auto writer = ArchiveWriter::create(path, take_at_60_hz());
     ASSERT_TRUE(writer->write_target(moving_target(0)).ok());
     const auto archive = ArchiveReader::open(path);
-    const auto blurred = through_shutter(*archive, archive->targets()[0], line_at(20), {.angle_deg = 720}, 1);
+    const auto blurred = through_shutter(*archive->open_target(0, 0), "target", archive->info().frame_rate_hz,
+                                         line_at(20), {.angle_deg = 720}, 1);
     ASSERT_TRUE(blurred.ok());
     ASSERT_EQ(shutter_warnings(*blurred).size(), 1u);
     EXPECT_NE(shutter_warnings(*blurred)[0].find("8.33 ms beyond"), std::string::npos);

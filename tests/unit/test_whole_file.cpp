@@ -190,3 +190,15 @@ TEST_F(WholeFile, each_line_is_there_when_add_returns) {
     none.add("one");
     EXPECT_TRUE(none.finish().ok());
 }
+
+TEST_F(WholeFile, an_exception_is_an_error_and_leaves_nothing_half_written) {
+    ASSERT_TRUE(write_whole_file(path("a"), "old").ok());
+    const auto give_up = [](const std::string& temporary) -> Status {
+        std::ofstream(fs::is_directory(temporary) ? temporary + "/part" : temporary) << "half of";
+        throw std::bad_alloc();
+    };
+    for (const Status& done : {write_whole_file(path("a"), give_up), make_whole_folder(path("b"), give_up)})
+        EXPECT_NE(done.error().message.find("memory ran out"), std::string::npos);
+    EXPECT_EQ(text_of("a"), "old");
+    EXPECT_EQ(names(), std::set<std::string>{"a"});
+}

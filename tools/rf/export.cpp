@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "archive/archive.hpp"
+#include "archive_option.hpp"
 #include "contact_sheet.hpp"
 #include "image/exr.hpp"
 #include "image/outputs.hpp"
@@ -26,7 +27,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-    std::string archive, output, format = "exr", contact_sheet;
+    ArchiveOption archive;
+    std::string output, format = "exr", contact_sheet;
     TargetOptions targets;
     double exposure_ev = 0;
     bool json = false;
@@ -69,17 +71,18 @@ struct Export {
 
     // Pictures go to that folder; nowhere if it is empty.
     Status write_to(const std::string& pictures) {
-        const auto head = archive.read_head(entry.camera, entry.index);
-        if (!head) return head.error();
+        const auto target = options.archive.open_target(archive, entry);
+        if (!target) return target.error();
         const auto& lights = archive.info().lights;
-        ContactSheet contact(lights, head->width, head->height);
-        const auto visited = for_each_lamp_image(archive, entry, [&](int lamp, const Image& rgb) -> Status {
-            if (!sheet.empty()) contact.add(lamp, rgb);
-            if (pictures.empty()) return Done{};
-            const std::string name = lamp_layer(lamp, int(lights.size())) + "." + options.format;
-            written.push_back({name, lights[lamp].direction});
-            return write_lamp(fs::path(pictures) / name, rgb, archive.info(), options);
-        });
+        ContactSheet contact(lights, target->head().width, target->head().height);
+        const auto visited =
+            for_each_lamp_image(*target, int(lights.size()), [&](int lamp, const Image& rgb) -> Status {
+                if (!sheet.empty()) contact.add(lamp, rgb);
+                if (pictures.empty()) return Done{};
+                const std::string name = lamp_layer(lamp, int(lights.size())) + "." + options.format;
+                written.push_back({name, lights[lamp].direction});
+                return write_lamp(fs::path(pictures) / name, rgb, archive.info(), options);
+            });
         if (!visited) return visited;
         if (!pictures.empty())
             if (auto s = write_lp((fs::path(pictures) / "lights.lp").string(), written); !s) return s;
@@ -88,8 +91,8 @@ struct Export {
 
     Status write_sheet(const ContactSheet& contact) {
         const auto title = fmt::format("{}   camera {}   target {}   {} lamps, from the top down; front in the middle",
-                                       fs::path(options.archive).lexically_normal().filename().string(), entry.camera,
-                                       entry.index, archive.info().lights.size());
+                                       fs::path(options.archive.path).lexically_normal().filename().string(),
+                                       entry.camera, entry.index, archive.info().lights.size());
         picture = contact.picture(title, options.exposure_ev);
         return write_png(sheet, picture.width, picture.height, picture.rgb8);
     }
@@ -110,7 +113,7 @@ struct Export {
 };
 
 Status check_places(const Options& options, const std::vector<TargetEntry>& targets) {
-    Outputs outputs{.inputs = {options.archive}};
+    Outputs outputs{.inputs = {options.archive.path}};
     for (const auto& entry : targets) {
         outputs.png.push_back(file_of_target(options.contact_sheet, entry, options.targets));
         outputs.folders.push_back(folder_of_target(options.output, entry, options.targets));
@@ -121,13 +124,13 @@ Status check_places(const Options& options, const std::vector<TargetEntry>& targ
 Status run(const Options& options) {
     if (options.output.empty() && options.contact_sheet.empty())
         return fail("nothing to do: give a folder with -o, or --contact-sheet");
-    const auto archive = ArchiveReader::open(options.archive);
+    const auto archive = options.archive.open("rf export");
     if (!archive) return archive.error();
-    const auto targets = choose_targets(*archive, options.archive, options.targets);
+    const auto targets = choose_targets(*archive, options.archive.path, options.targets);
     if (!targets) return targets.error();
     if (const auto writable = check_places(options, targets->finished); !writable) return writable;
     if (const auto warning = targets->warning(); !warning.empty()) fmt::print(stderr, "rf export: {}\n", warning);
-    nlohmann::json report = {{"archive", options.archive}, {"missing_targets", targets->missing_json()}};
+    nlohmann::json report = {{"archive", options.archive.path}, {"missing_targets", targets->missing_json()}};
     for (const auto& entry : targets->finished) {
         Export exporting{*archive, entry, options};
         if (const auto done = exporting.write(); !done) return done;
@@ -148,7 +151,7 @@ void add_export_verb(CLI::App& app, int& exit_code) {
         "         rf export performance.rfa --target all -o lamps     # lamps_000000, lamps_000001 ...\n"
         "Pictures are R G B: mosaics are demosaiced. EXR is scene-linear half float; PNG is 8-bit sRGB of the linear "
         "values times 2^EV, clipped to 0..1. lights.lp lists the pictures by name.");
-    verb->add_option("archive", options->archive, "take.rfa")->required();
+    options->archive.add_to(*verb);
     verb->add_option("-o,--output", options->output, "folder to make");
     verb->add_option("--format", options->format, "exr or png")->check(CLI::IsMember({"exr", "png"}));
     options->targets.add_to(*verb);

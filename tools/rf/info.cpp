@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "archive/archive.hpp"
+#include "image/json_object.hpp"
 #include "program.hpp"
 #include "verbs.hpp"
 
@@ -58,7 +59,7 @@ json archive_report(const ArchiveReader& archive, const std::string& path) {
 std::string target_line(const json& target) {
     TargetEntry entry;
     entry.index = target["index"], entry.last = target.value("through", entry.index);
-    const auto name = fmt::format("camera {} {}", target["camera"].get<int>(), target_words(entry));
+    const auto name = fmt::format("camera {} {}", target["camera"].get<uint32_t>(), target_words(entry));
     if (target.contains("missing")) return name + ": missing: " + target["missing"].get<std::string>();
     if (target.contains("damaged")) return name + ": damaged: " + target["damaged"].get<std::string>();
     auto line = fmt::format("{}: {} x {}, {}, {:.1f} MB", name, target["width"].get<int>(), target["height"].get<int>(),
@@ -72,11 +73,15 @@ std::string target_line(const json& target) {
     return line;
 }
 
+// `extra` is what a take chose to say: what is of another kind than expected is shown as it is.
 std::string basis_line(const json& basis) {
-    const bool is_estimate = basis.value("is_estimate", false);
-    return fmt::format("{} rows over {} lamps, rank {}, condition {:.4g}{}", basis.value("rows", 0),
-                       basis.value("lamps", 0), basis.value("rank", 0), basis.value("condition", 0.0),
-                       is_estimate ? "; fewer independent rows than lamps: the values are an ESTIMATE" : "");
+    const auto shown = [&](const char* key) { return json_line(basis.value(key, json())); };
+    const json condition = basis.value("condition", json());
+    return fmt::format("{} rows over {} lamps, rank {}, condition {}{}", shown("rows"), shown("lamps"), shown("rank"),
+                       condition.is_number() ? fmt::format("{:.4g}", condition.get<double>()) : shown("condition"),
+                       basis.value("is_estimate", json()) == true
+                           ? "; fewer independent rows than lamps: the values are an ESTIMATE"
+                           : "");
 }
 
 void print_report(const json& report, const TakeInfo& info) {
@@ -107,6 +112,7 @@ void print_report(const json& report, const TakeInfo& info) {
 Status run(const std::string& path, bool as_json) {
     const auto archive = ArchiveReader::open(path);
     if (!archive) return archive.error();
+    for (const auto& problem : archive->journal_problems()) fmt::print(stderr, "rf info: {}\n", problem);
     const json report = archive_report(*archive, path);
     if (as_json)
         print_json(report);

@@ -10,18 +10,14 @@ namespace ols {
 
 namespace {
 
-constexpr size_t group_bytes = size_t(2) << 30, strip_bytes = size_t(512) << 20;
-constexpr int tile_rows = 64;
+constexpr size_t group_bytes = size_t(2) << 30;
 
 // Lamps first .. first + images.size() - 1, one or three channels each.
-Status read_group(const ArchiveReader& archive, const TargetEntry& entry, const Target& head, int lamps, int first,
-                  std::vector<Image>& images) {
-    const int planes = head.planes();
-    const size_t row_bytes = size_t(head.width) * lamps * planes * sizeof(float);
-    const int rows = int(std::max<size_t>(strip_bytes / row_bytes / tile_rows, 1)) * tile_rows;
+Status read_group(const TargetReader& target, int first, std::vector<Image>& images) {
+    const Target& head = target.head();
+    const int planes = head.planes(), rows = target.strip_rows();
     for (int y = 0; y < head.height; y += rows) {
-        const auto strip =
-            archive.read_box(entry.camera, entry.index, {0, y, head.width, std::min(rows, head.height - y)});
+        const auto strip = target.read_box({0, y, head.width, std::min(rows, head.height - y)});
         if (!strip) return strip.error();
         for (size_t k = 0; k < images.size(); ++k)
             for (int c = 0; c < planes; ++c) {
@@ -35,18 +31,16 @@ Status read_group(const ArchiveReader& archive, const TargetEntry& entry, const 
 
 }  // namespace
 
-Status for_each_lamp_image(const ArchiveReader& archive, const TargetEntry& entry,
+Status for_each_lamp_image(const TargetReader& target, int lamps,
                            const std::function<Status(int lamp, const Image& rgb)>& visit) {
-    const auto head = archive.read_head(entry.camera, entry.index);
-    if (!head) return head.error();
-    const int lamps = int(archive.info().lights.size());
-    const size_t image_bytes = size_t(head->width) * head->height * head->planes() * sizeof(float);
+    const Target& head = target.head();
+    const size_t image_bytes = size_t(head.width) * head.height * head.planes() * sizeof(float);
     const int group = int(std::clamp<size_t>(group_bytes / image_bytes, 1, lamps));
     for (int first = 0; first < lamps; first += group) {
-        std::vector<Image> images(std::min(group, lamps - first), Image(head->width, head->height, head->planes()));
-        if (auto s = read_group(archive, entry, *head, lamps, first, images); !s) return s;
+        std::vector<Image> images(std::min(group, lamps - first), Image(head.width, head.height, head.planes()));
+        if (auto s = read_group(target, first, images); !s) return s;
         for (size_t k = 0; k < images.size(); ++k)
-            if (auto s = visit(first + int(k), as_rgb(images[k], head->cfa)); !s) return s;
+            if (auto s = visit(first + int(k), as_rgb(images[k], head.cfa)); !s) return s;
     }
     return Done{};
 }

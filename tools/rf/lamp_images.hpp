@@ -11,7 +11,7 @@ namespace ols {
 // Calls `visit` with each lamp's image in order: three channels, mosaics demosaiced, grey repeated. Lamps are tiled
 // together in the file, so a target beyond some 2 GB of pictures is read several times over, never held whole.
 // The first error, of reading or of `visit`, ends it.
-Status for_each_lamp_image(const ArchiveReader& archive, const TargetEntry& entry,
+Status for_each_lamp_image(const TargetReader& target, int lamps,
                            const std::function<Status(int lamp, const Image& rgb)>& visit);
 
 }  // namespace ols

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "archive/archive.hpp"
+#include "archive_option.hpp"
 #include "image/demosaic.hpp"
 #include "image/exr.hpp"
 #include "image/outputs.hpp"
@@ -27,7 +28,8 @@ namespace ols {
 namespace {
 
 struct Options {
-    std::string archive, output, png;
+    ArchiveOption archive;
+    std::string output, png;
     TargetOptions targets;
     LightingOptions lighting;
     ShutterOptions shutter;
@@ -35,21 +37,12 @@ struct Options {
     bool single_float = false, json = false;
 };
 
-// Targets are read in strips of whole tiles of at most this size, so that takes of any size can be relit.
-constexpr size_t strip_bytes = size_t(512) << 20;
-constexpr int tile_rows = 64;
-
 struct RelitTarget {
     Image image;  // R G B A, premultiplied; alpha is 0 outside the take's mask
     MaskCounts masked;
     size_t left_out_samples = 0;
     std::vector<int> missing_lamps;
 };
-
-int strip_rows(const Target& head, size_t lamps) {
-    const size_t row_bytes = size_t(head.width) * lamps * head.planes() * sizeof(float);
-    return int(std::max<size_t>(strip_bytes / row_bytes / tile_rows, 1)) * tile_rows;
-}
 
 Image with_alpha(const Image& rgb, const std::vector<uint32_t>& mask) {
     Image rgba(rgb.width, rgb.height, 4);
@@ -61,30 +54,30 @@ Image with_alpha(const Image& rgb, const std::vector<uint32_t>& mask) {
     return rgba;
 }
 
-Result<RelitTarget> relight_target(const ArchiveReader& archive, const TargetEntry& entry, const LampWeights& weights,
+// Reads the target in strips, so that takes of any size can be relit.
+Result<RelitTarget> relight_target(const TargetReader& target, const std::string& file, const LampWeights& weights,
                                    int threads) {
-    const auto head = archive.read_head(entry.camera, entry.index);
-    if (!head) return head.error();
+    const Target& head = target.head();
     RelitTarget relit;
-    relit.missing_lamps = head->missing_lamps;
+    relit.missing_lamps = head.missing_lamps;
     Image sum;
     std::vector<uint32_t> mask;
-    const int rows = strip_rows(*head, archive.info().lights.size());
-    for (int y = 0; y < head->height; y += rows) {
-        const Box box = {0, y, head->width, std::min(rows, head->height - y)};
-        const auto strip = archive.read_box(entry.camera, entry.index, box);
+    const int rows = target.strip_rows();
+    for (int y = 0; y < head.height; y += rows) {
+        const Box box = {0, y, head.width, std::min(rows, head.height - y)};
+        const auto strip = target.read_box(box);
         if (!strip) return strip.error();
         auto lit = relight({box.width, box.height, strip->cfa, strip->lamps}, weights, threads);
-        if (!lit) return fail(fmt::format("'{}': {}", entry.file, lit.error().message));
-        if (sum.data.empty()) sum = Image(head->width, head->height, lit->image.channels);
+        if (!lit) return fail(fmt::format("'{}': {}", file, lit.error().message));
+        if (sum.data.empty()) sum = Image(head.width, head.height, lit->image.channels);
         std::copy(lit->image.data.begin(), lit->image.data.end(),
-                  sum.data.begin() + std::ptrdiff_t(y) * head->width * sum.channels);
+                  sum.data.begin() + std::ptrdiff_t(y) * head.width * sum.channels);
         mask.insert(mask.end(), strip->mask.begin(), strip->mask.end());
         for (size_t samples : lit->left_out_samples) relit.left_out_samples += samples;
     }
-    mask.resize(size_t(head->width) * head->height);
+    mask.resize(size_t(head.width) * head.height);
     relit.masked.add(mask);
-    relit.image = with_alpha(as_rgb(sum, head->cfa), mask);
+    relit.image = with_alpha(as_rgb(sum, head.cfa), mask);
     return relit;
 }
 
@@ -125,11 +118,14 @@ void warn(const RelitTarget& relit, const std::string& file, double light_missin
 
 Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const TargetEntry& entry,
                                          const Lighting& lighting, const Options& options) {
-    auto relit = relight_target(archive, entry, lighting.weights, options.threads);
+    const auto target = options.archive.open_target(archive, entry);
+    if (!target) return target.error();
+    auto relit = relight_target(*target, entry.file, lighting.weights, options.threads);
     if (!relit) return relit.error();
     nlohmann::json shutter;
     if (options.shutter.is_open()) {
-        auto blurred = through_shutter(archive, entry, relit->image, options.shutter, options.threads);
+        auto blurred = through_shutter(*target, entry.file, archive.info().frame_rate_hz, relit->image, options.shutter,
+                                       options.threads);
         if (!blurred) return blurred.error();
         for (const auto& warning : shutter_warnings(*blurred))
             fmt::print(stderr, "rf relight: {}: {}\n", entry.file, warning);
@@ -162,7 +158,7 @@ Result<nlohmann::json> relight_and_write(const ArchiveReader& archive, const Tar
 }
 
 Status check_files(const Options& options, const std::vector<TargetEntry>& targets) {
-    Outputs outputs{.inputs = {options.archive, options.lighting.environment}};
+    Outputs outputs{.inputs = {options.archive.path, options.lighting.environment}};
     for (const auto& entry : targets) {
         outputs.exr.push_back(file_of_target(options.output, entry, options.targets));
         outputs.png.push_back(file_of_target(options.png, entry, options.targets));
@@ -171,21 +167,22 @@ Status check_files(const Options& options, const std::vector<TargetEntry>& targe
 }
 
 Status run(const Options& options) {
-    const auto archive = ArchiveReader::open(options.archive);
+    const auto archive = options.archive.open("rf relight");
     if (!archive) return archive.error();
     const auto cells = cells_of_lights(archive->info().lights);
-    if (!cells) return fail("'" + options.archive + "': " + cells.error().message);
-    const auto targets = choose_targets(*archive, options.archive, options.targets);
+    if (!cells) return fail("'" + options.archive.path + "': " + cells.error().message);
+    const auto targets = choose_targets(*archive, options.archive.path, options.targets);
     if (!targets) return targets.error();
     if (const auto writable = check_files(options, targets->finished); !writable) return writable;
     if (options.shutter.is_open())
-        if (const auto known = check_motion_known(*archive, options.archive, targets->finished); !known) return known;
+        if (const auto known = check_motion_known(*archive, options.archive.path, targets->finished); !known)
+            return known;
     const auto lighting = make_lighting(options.lighting, *cells);
     if (!lighting) return lighting.error();
     for (const auto& warning : lighting->warnings) fmt::print(stderr, "rf relight: {}\n", warning);
     if (const auto warning = targets->warning(); !warning.empty()) fmt::print(stderr, "rf relight: {}\n", warning);
     nlohmann::json report = lighting->report;
-    report["archive"] = options.archive;
+    report["archive"] = options.archive.path;
     report["lamps"] = cells->size();
     report["missing_targets"] = targets->missing_json();
     for (const auto& entry : targets->finished) {
@@ -208,7 +205,7 @@ void add_relight_verb(CLI::App& app, int& exit_code) {
                     "The OpenEXR file is scene-linear; a white surface under radiance 1 from everywhere is 1.\n"
                     "The PNG's tone curve: {}.",
                     tone_curve_text));
-    verb->add_option("archive", options->archive, "take.rfa")->required();
+    options->archive.add_to(*verb);
     options->lighting.add_to(*verb);
     options->shutter.add_to(*verb);
     options->targets.add_to(*verb);

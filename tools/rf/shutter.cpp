@@ -40,16 +40,16 @@ Status check_motion_known(const ArchiveReader& archive, const std::string& path,
     return Done{};
 }
 
-Result<BlurredImage> through_shutter(const ArchiveReader& archive, const TargetEntry& target, const Image& sharp,
-                                     const ShutterOptions& options, int threads) {
-    const auto motion = archive.read_motion(target.camera, target.index);
+Result<BlurredImage> through_shutter(const TargetReader& target, const std::string& file, double frame_rate_hz,
+                                     const Image& sharp, const ShutterOptions& options, int threads) {
+    const auto motion = target.read_motion();
     if (!motion) return motion.error();
-    auto blurred = motion_blurred(sharp, *motion, archive.info().frame_rate_hz,
+    auto blurred = motion_blurred(sharp, *motion, frame_rate_hz,
                                   {.shutter_deg = options.angle_deg,
                                    .phase_deg = options.phase_deg,
                                    .step_px = options.step_px,
                                    .threads = threads});
-    if (!blurred) return fail(fmt::format("'{}': {}", target.file, blurred.error().message));
+    if (!blurred) return fail(fmt::format("'{}': {}", file, blurred.error().message));
     return blurred;
 }
 

@@ -27,9 +27,9 @@ struct ShutterOptions {
 Status check_motion_known(const ArchiveReader& archive, const std::string& path,
                           const std::vector<TargetEntry>& targets);
 
-// The target's picture blurred along the target's motion, at the take's frame rate.
-Result<BlurredImage> through_shutter(const ArchiveReader& archive, const TargetEntry& target, const Image& sharp,
-                                     const ShutterOptions& options, int threads);
+// The target's picture blurred along the target's motion, at the take's frame rate. Errors begin with `file`.
+Result<BlurredImage> through_shutter(const TargetReader& target, const std::string& file, double frame_rate_hz,
+                                     const Image& sharp, const ShutterOptions& options, int threads);
 
 // One line each: motion that was not known for all of the exposure, pixels that saw nothing.
 std::vector<std::string> shutter_warnings(const BlurredImage& blurred);

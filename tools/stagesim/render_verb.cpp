@@ -4,10 +4,12 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "image/exr.hpp"
+#include "image/json_object.hpp"
 #include "image/outputs.hpp"
 #include "image/png.hpp"
 #include "image/tone.hpp"
@@ -33,15 +35,18 @@ struct RenderOptions {
 
 // `{"weights": [w, ...]}` or `{"weights": [[r, g, b], ...]}`, one for each lamp from 0; the rest is dark.
 Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) {
-    std::ifstream file(path);
-    const auto json = nlohmann::json::parse(file, nullptr, false);
+    std::ifstream file(path, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (!file) return fail("cannot read '" + path + "': check the path");
+    const auto parsed = parse_json(text, "'" + path + "'");
+    if (!parsed) return parsed.error();
+    const nlohmann::json entries = parsed->is_object() ? parsed->value("weights", nlohmann::json()) : nlohmann::json();
     const Error wrong =
         fail(fmt::format("'{}' must hold {{\"weights\": [...]}} with at most {} numbers or [r, g, b]", path, lamps));
-    if (!file || json.is_discarded() || !json.contains("weights") || !json["weights"].is_array()) return wrong;
-    if (json["weights"].size() > lamps) return wrong;
+    if (!entries.is_array() || entries.size() > lamps) return wrong;
     std::vector<Float3> weights(lamps);
-    for (size_t i = 0; i < json["weights"].size(); ++i) {
-        const auto& entry = json["weights"][i];
+    for (size_t i = 0; i < entries.size(); ++i) {
+        const auto& entry = entries[i];
         const bool rgb = entry.is_array() && entry.size() == 3;
         for (const auto& value : rgb ? entry : nlohmann::json::array({entry}))
             if (!value.is_number()) return wrong;
