@@ -112,6 +112,19 @@ std::string lamp_file(const RenderOptions& options, size_t lamp) {
     return fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
 }
 
+std::string lights_file(const RenderOptions& options) {
+    return options.out + "/lights.lp";
+}
+
+// The pictures of the sphere's lamps with their lights: the folder is then ready for `stagectl ingest`.
+Status write_lights(const RenderOptions& options, const StageConfig& stage) {
+    std::vector<LightPosition> lights;
+    for (size_t lamp = 0; lamp < stage.lamps.size(); ++lamp)
+        lights.push_back(
+            {std::filesystem::path(lamp_file(options, lamp)).filename().string(), stage.lamps[lamp].direction});
+    return write_lp(lights_file(options), lights);
+}
+
 Status render_olat(const RenderOptions& options, Renderer& renderer, const CameraConfig& camera) {
     for (size_t lamp = 0; lamp < renderer.lamp_count(); ++lamp) {
         std::vector<Float3> weights(renderer.lamp_count());
@@ -119,6 +132,7 @@ Status render_olat(const RenderOptions& options, Renderer& renderer, const Camer
         const Status written =
             write_picture(options, renderer.light(weights, options.time_us), camera, lamp_file(options, lamp));
         if (!written) return written;
+        renderer.forget_light();  // a thousand lamps' images would not fit
         show_progress("lamps", double(lamp + 1) / double(renderer.lamp_count()));
     }
     return Done{};
@@ -133,17 +147,22 @@ Status make_folder(const std::string& path) {
 
 Status check_files(const RenderOptions& options, size_t lamps) {
     Outputs outputs{.inputs = {options.inputs.scene, options.inputs.stage, options.weights, options.env}};
-    if (options.olat)
+    if (options.olat) {
         for (size_t lamp = 0; lamp < lamps; ++lamp) outputs.files.push_back(lamp_file(options, lamp));
-    else
+        outputs.files.push_back(lights_file(options));
+    } else {
         outputs.files = {options.out, options.png};
+    }
     return check_outputs(outputs);
 }
 
 nlohmann::json report(const RenderOptions& options, const Inputs& inputs, size_t lamps) {
     nlohmann::json report = {{"output", options.out},          {"png", options.png},   {"width", inputs.camera.width},
                              {"height", inputs.camera.height}, {"unit", options.unit}, {"at_us", options.time_us}};
-    if (options.olat) report["pictures"] = lamps;
+    if (options.olat) {
+        report["pictures"] = lamps;
+        report["lights"] = lights_file(options);
+    }
     return report;
 }
 
@@ -161,6 +180,8 @@ Status render(const RenderOptions& options) {
     const Status done =
         options.olat ? render_olat(options, renderer, inputs->camera)
                      : write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
+    if (done && options.olat)
+        if (const Status listed = write_lights(options, inputs->stage); !listed) return listed;
     if (done && options.json) print_json(report(options, *inputs, lamps));
     return done;
 }
@@ -181,17 +202,23 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     light->add_flag("--all-lamps", options->all_lamps, "every lamp of the sphere at 1");
     light->add_option("--weights", options->weights, "JSON file {\"weights\": [w or [r, g, b], ...]}");
     light->add_option("--env", options->env, "environment map (.exr, .hdr): lamps weighted as `rf relight` does");
-    auto* olat = light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
+    auto* olat = light->add_flag(
+        "--olat", options->olat,
+        "one picture a lamp, into the folder of -o, and lights.lp: the directions of the sphere's lamps");
     light->require_option(1);
     verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
     verb->add_option("--rotate", options->rotate_deg,
-                     "turn the environment about +Y, degrees: light from +Z moves to +X");
-    verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
-    verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene");
+                     "turn the environment about +Y, degrees: light from +Z moves to +X")
+        ->check(number_from(-36000.0, 36000.0));
+    verb->add_option("--exposure", options->exposure_ev, "stops, of the environment")
+        ->check(number_from(-100.0, 100.0));
+    verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene")
+        ->check(number_from(-1e12, 1e12));
     verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));
     verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
     verb->add_option("--png", options->png, "preview file, of one picture")->excludes(olat);
-    verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve");
+    verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve")
+        ->check(number_from(0.0, 1e9));
     verb->add_flag("--json", options->json, "print what was written as JSON");
     verb->callback([options, &exit_code] {
         const Status status = options->out.empty() && options->png.empty()
