@@ -2,10 +2,7 @@
 // Strict reading of TOML over toml++; its exceptions and its types stay in this file.
 #include "stage/toml_section.hpp"
 
-// With exceptions an error ends the parsing where it is found; without, toml++ 3.3 goes on and runs into its own asserts.
-#define TOML_EXCEPTIONS 1
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +10,21 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <stdexcept>
 
 #include "image/bounded_file.hpp"
-#include "stage/toml_depth.hpp"
+#include "stage/toml_outline.hpp"
+
+// toml++ 3.3 asserts what some texts do not hold. Its asserts are thrown, in builds without asserts, too, and with exceptions
+// an error ends the parsing where it is found.
+[[noreturn]] static void toml_assert_failed() {
+    throw std::logic_error(
+        "this is no TOML, and its parser cannot say which line: look for brackets that name nothing");
+}
+#undef NDEBUG
+#define TOML_ASSERT(expression) ((expression) ? void() : toml_assert_failed())
+#define TOML_EXCEPTIONS 1
+#include <toml++/toml.h>
 
 namespace ols {
 
@@ -112,7 +121,7 @@ TomlSection::TomlSection(std::shared_ptr<File> file, const void* table, std::str
 Result<TomlSection> TomlSection::open(const std::string& path) {
     const auto text = read_bounded_file(path, "configuration", file_bytes_max);
     if (!text) return text.error();
-    if (const Status flat = check_toml_depth(path, *text); !flat) return flat.error();
+    if (const Status bounded = check_toml_outline(path, *text); !bounded) return bounded.error();
     auto file = std::make_shared<File>();
     file->path = path;
     try {

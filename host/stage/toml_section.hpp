@@ -19,7 +19,7 @@ namespace ols {
 // range that it may have, both ends included: nothing outside of it, no NaN and no other type comes through.
 class TomlSection {
   public:
-    // Parses a file and returns its root table. Errors: no regular file, more than 4 MiB, nested deeper than toml_depth.hpp
+    // Parses a file and returns its root table. Errors: no regular file, more than 4 MiB, nested deeper than toml_outline.hpp
     // allows, no TOML.
     static Result<TomlSection> open(const std::string& path);
 
