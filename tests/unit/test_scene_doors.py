@@ -206,3 +206,23 @@ def test_numbers_of_the_command_line_have_ranges(tmp_path, option, value):
     done = subprocess.run([BIN / "stagesim", "render", SCENE, "--lamps", "0", "-o", tmp_path / "o.exr", option, value],
                           capture_output=True, text=True)
     assert done.returncode not in (0, 1) and done.returncode > 0 and option in done.stderr, done
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"weights": 1}', '{"weights": [1e300]}', '{"weights": ["1"]}', '{"weights": [[1, 2]]}',
+                                  '{"weights": [1], "unit": "W"}', '{"weights": ' + json.dumps([1] * 163) + "}", "[" * 100_000, "\xff"])
+def test_weights_that_cannot_be_are_refused(tmp_path, text):
+    (tmp_path / "w.json").write_bytes(text.encode("latin-1"))
+    assert "w.json' must hold" in run("stagesim", "render", SCENE, "--weights", tmp_path / "w.json", "-o", tmp_path / "o.exr", code=1)
+    (tmp_path / "w.json").unlink()
+    os.mkfifo(tmp_path / "w.json")
+    assert "is a pipe" in run("stagesim", "render", SCENE, "--weights", tmp_path / "w.json", "-o", tmp_path / "o.exr", code=1)
+
+
+def test_weights_are_those_of_the_file(tmp_path):
+    (tmp_path / "stage.toml").write_text(SMALL)
+    weights = [0] * 60 + [2, [0, 0.5, 1]]
+    (tmp_path / "w.json").write_text(json.dumps({"weights": weights}))
+    for name, light in (("both", ("--weights", tmp_path / "w.json")), ("a", ("--lamps", "60")), ("b", ("--lamps", "61"))):
+        run("stagesim", "render", SCENE, "--stage", tmp_path / "stage.toml", *light, "-o", tmp_path / f"{name}.exr")
+    both, a, b = (pixels(tmp_path / f"{name}.exr") for name in ("both", "a", "b"))
+    assert both.max() > 0 and np.allclose(both, 2 * a + np.array([0, 0.5, 1]) * b, rtol=1e-5)

@@ -2,11 +2,14 @@
 // stagesim render: pictures of a scene without sensor and noise, the truth that recorded takes are held against.
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
+#include "image/bounded_file.hpp"
 #include "image/exr.hpp"
 #include "image/outputs.hpp"
 #include "image/png.hpp"
@@ -30,21 +33,37 @@ struct RenderOptions {
     double rotate_deg = 0, exposure_ev = 0, time_us = 0, png_gain = 1;
 };
 
+constexpr double weight_max = 1e6;
+constexpr uint64_t weights_bytes_max = 16 << 20;
+
+// A number or three of them, within weight_max.
+std::optional<Float3> weight_of(const nlohmann::json& entry) {
+    std::array<float, 3> rgb;
+    if (entry.is_array() && entry.size() != 3) return std::nullopt;
+    for (size_t c = 0; c < 3; ++c) {
+        const nlohmann::json& value = entry.is_array() ? entry[c] : entry;
+        if (!value.is_number() || !(std::abs(value.get<double>()) <= weight_max)) return std::nullopt;
+        rgb[c] = value.get<float>();
+    }
+    return Float3{rgb[0], rgb[1], rgb[2]};
+}
+
 // `{"weights": [w, ...]}` or `{"weights": [[r, g, b], ...]}`, one for each lamp from 0; the rest is dark.
 Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) {
-    std::ifstream file(path);
-    const auto json = nlohmann::json::parse(file, nullptr, false);
+    const auto text = read_bounded_file(path, "weights", weights_bytes_max);
+    if (!text) return text.error();
+    const auto json = nlohmann::json::parse(*text, nullptr, false);
     const Error wrong =
-        fail(fmt::format("'{}' must hold {{\"weights\": [...]}} with at most {} numbers or [r, g, b]", path, lamps));
-    if (!file || json.is_discarded() || !json.contains("weights") || !json["weights"].is_array()) return wrong;
+        fail(fmt::format("'{}' must hold {{\"weights\": [...]}} and nothing else, with at most {} numbers "
+                         "or [r, g, b] from {} to {}",
+                         path, lamps, -weight_max, weight_max));
+    if (!json.is_object() || json.size() != 1 || !json.contains("weights") || !json["weights"].is_array()) return wrong;
     if (json["weights"].size() > lamps) return wrong;
     std::vector<Float3> weights(lamps);
     for (size_t i = 0; i < json["weights"].size(); ++i) {
-        const auto& entry = json["weights"][i];
-        const bool rgb = entry.is_array() && entry.size() == 3;
-        for (const auto& value : rgb ? entry : nlohmann::json::array({entry}))
-            if (!value.is_number()) return wrong;
-        weights[i] = rgb ? Float3{entry[0], entry[1], entry[2]} : Float3{entry, entry, entry};
+        const auto weight = weight_of(json["weights"][i]);
+        if (!weight) return wrong;
+        weights[i] = *weight;
     }
     return weights;
 }
