@@ -177,7 +177,7 @@ Result<StageConfig> read_stage(const std::string& path) {
 }
 
 Status check_chain(const StageConfig& stage) {
-    if (int(stage.chain_bit_of_lamp.size()) == stage.lamp_count()) return Done{};
+    if (int(stage.chain_bit_of_lamp.size()) >= stage.lamp_count()) return Done{};
     return fail(
         fmt::format("the stage has {} lamps and a board's chain drives {}: such a stage can be rendered (`stagesim "
                     "render`), not played",
