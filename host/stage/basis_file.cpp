@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <sstream>
 
+#include "image/bounded_file.hpp"
 #include "image/whole_file.hpp"
 #include "stage/basis_inverse.hpp"
 #include "wire.h"
@@ -20,7 +20,8 @@ namespace ols {
 namespace {
 
 constexpr int level_limit = 255;
-constexpr std::streamsize line_bytes_max = 64 * 1024;  // 255 and a comma for each of 256 lamps take 1 KB
+constexpr size_t line_bytes_max = 64 * 1024;   // 255 and a comma for each of 256 lamps take 1 KB
+constexpr uint64_t file_bytes_max = 16 << 20;  // 1024 rows take 1 MB; comments may be long
 
 struct Lines {
     std::string path;
@@ -57,15 +58,24 @@ bool has_empty_cell(const std::string& line) {
     }
 }
 
+// The text with \n at its lines' ends (old Mac files have \r alone) and without a byte order mark.
+Result<std::string> read_text(const std::string& path) {
+    auto text = read_bounded_file(path, "basis file", file_bytes_max);
+    if (!text.ok()) return text;
+    if (text->starts_with("\xff\xfe") || text->starts_with("\xfe\xff"))
+        return fail(path + ": is UTF-16 text: save it as UTF-8 or as plain CSV");
+    if (text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
+    if (text->find('\n') == std::string::npos) std::replace(text->begin(), text->end(), '\r', '\n');
+    return text;
+}
+
 // The next line without its end; false at the end of the file.
 Result<bool> next_line(std::istream& file, Lines& at, std::string& line) {
-    line.resize(line_bytes_max);
-    file.getline(line.data(), line_bytes_max);
     at.number++;
-    if (file.fail() && !file.eof())
+    if (!std::getline(file, line)) return false;
+    if (line.size() >= line_bytes_max)
         return at.error(fmt::format("a line of more than {} bytes is no row of levels", line_bytes_max - 1));
-    line.resize(size_t(file.gcount()) - !file.eof());  // it counts the line's end, where there is one
-    return !(file.eof() && line.empty());
+    return true;
 }
 
 // `# level_max = N`; other comments say nothing.
@@ -97,8 +107,9 @@ Status read_row(const Lines& at, const std::vector<std::string>& words, Basis& b
 }  // namespace
 
 Result<Basis> read_basis(const std::string& path, int lamps) {
-    std::ifstream file(path);
-    if (!file) return fail("cannot read the basis file '" + path + "': check that it exists");
+    auto text = read_text(path);
+    if (!text.ok()) return text.error();
+    std::istringstream file(std::move(*text));
     Basis basis;
     basis.name = std::filesystem::path(path).stem().string();
     basis.lamps = lamps;

@@ -69,7 +69,7 @@ Slot read_slot(TomlSection table, double period_us) {
 
 std::vector<Slot> read_listed_slots(TomlSection& file, double period_us) {
     std::vector<Slot> slots;
-    for (auto& table : file.sections("slot")) slots.push_back(read_slot(table, period_us));
+    for (auto& table : file.sections("slot", OLS_SLOTS_MAX)) slots.push_back(read_slot(table, period_us));
     return slots;
 }
 

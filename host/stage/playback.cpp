@@ -69,7 +69,7 @@ Playback read_playback(TomlSection& file) {
     playback.heartbeat_ticks = uint32_t(ticks_of_us(heartbeat_ms * 1e3));
     playback.lead_ticks = uint32_t(ticks_of_us(lead_us));
     uint8_t lines_read = 0;
-    for (auto& table : file.sections("trigger")) read_trigger(table, playback, lines_read);
+    for (auto& table : file.sections("trigger", OLS_TRIGGERS)) read_trigger(table, playback, lines_read);
     return playback;
 }
 

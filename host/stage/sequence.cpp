@@ -250,6 +250,7 @@ static Result<Sequence> compile_capture(const SequenceConfig& config, const Stag
 
 Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage) {
     const bool is_capture = config.listed_slots.empty() && config.basis != harmonics_name;
+    if (const Status playable = check_chain(stage); !playable.ok()) return playable.error();
     auto sequence = is_capture ? compile_capture(config, stage) : compile_patterns(config, stage);
     if (!sequence.ok()) return sequence;
     for (Slot& slot : sequence->slots) slot.trigger_offset_ticks += config.kind_offset_ticks[size_t(slot.kind)];

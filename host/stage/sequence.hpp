@@ -90,7 +90,7 @@ Result<SequenceConfig> read_sequence(const std::string& path);
 // each lamp's light spreads evenly over the cycle (stage/slot_order.hpp). Dark slot d lies in the middle of the d-th equal part of the cycle's groups, at a
 // place of its own: no two dark slots have the same distance to their group's tracking slot, so that each of them
 // alone tells where in the cycle it is.
-// Errors: basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;
+// Errors: more lamps than a chain drives; basis and stage differ in lamps; an exposure that does not fit its period; a cycle above the board's limit;
 // an order of kinds that some rotation repeats (see has_unique_order).
 // Listed slots and spherical harmonics are taken as they are, without optical code.
 Result<Sequence> compile_sequence(const SequenceConfig& config, const StageConfig& stage);

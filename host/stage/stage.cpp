@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
 
 #include "stage/camera_presets.hpp"
@@ -22,6 +23,9 @@ std::vector<Vec3> default_matte_lamps() {
         for (const double x : {-0.25, 0.0, 0.25}) places.push_back({x, y, -0.35});
     return places;
 }
+
+constexpr double far_m = 1000;  // from the stage's centre: single precision still tells 0.1 mm apart there
+constexpr size_t cameras_max = 64, matte_lamps_max = OLS_CHAIN_BITS_MAX;
 
 std::vector<int> identity_chain(int lamps) {
     std::vector<int> bits(lamps);
@@ -50,15 +54,23 @@ void read_lamps(TomlSection lamps, StageConfig& stage) {
     lamps.read("fall_us", stage.lamp_response.fall_us, 0, 1000);
     if (!lamps.has("matte")) return;
     stage.matte_lamps_m.clear();
-    for (auto& place : lamps.sections("matte")) {
+    for (auto& place : lamps.sections("matte", matte_lamps_max)) {
         std::array<double, 3> position_m{};
         if (!place.has("position_m")) place.reject("position_m", "is missing");
-        place.read("position_m", position_m);
+        place.read("position_m", position_m, -far_m, far_m);
         stage.matte_lamps_m.push_back({position_m[0], position_m[1], position_m[2]});
     }
 }
 
+// A stage of more lamps than a chain has bits is fine to render; check_chain() says so where a board is to play it.
 void read_chain(TomlSection chain, StageConfig& stage) {
+    const bool is_given = chain.has("bits") || chain.has("bit_of_lamp");
+    if (!is_given && stage.lamp_count() > OLS_CHAIN_BITS_MAX) {
+        stage.chain_bits = 0;
+        stage.chain_bit_of_lamp.clear();
+        return;
+    }
+    if (!is_given) stage.chain_bits = std::max(stage.chain_bits, stage.lamp_count());
     chain.read("bits", stage.chain_bits, 1, OLS_CHAIN_BITS_MAX);
     stage.chain_bit_of_lamp = identity_chain(stage.lamp_count());
     chain.read("bit_of_lamp", stage.chain_bit_of_lamp, 0, stage.chain_bits - 1);
@@ -82,6 +94,23 @@ void read_preset(TomlSection& camera, CameraConfig& config) {
     camera.read_choice("preset", chosen, presets);
     config.bits = chosen.bits;
     config.noise = chosen.noise;
+}
+
+Vec3 to_vec3(const std::array<double, 3>& a) {
+    return {a[0], a[1], a[2]};
+}
+
+// Where the camera stands and looks: the view and `up` must span a plane.
+void read_view(TomlSection& camera, CameraConfig& config) {
+    camera.read("position_m", config.position_m, -far_m, far_m);
+    camera.read("look_at_m", config.look_at_m, -far_m, far_m);
+    camera.read_direction("up", config.up);
+    camera.read("vertical_fov_deg", config.vertical_fov_deg, 0.1, 170);
+    const Vec3 view = to_vec3(config.look_at_m) - to_vec3(config.position_m), up = to_vec3(config.up);
+    if (length(view) < 1e-3)
+        return camera.reject("look_at_m", "is where the camera stands: look at a place 1 mm or more from position_m");
+    if (length(cross(view, up)) < 1e-6 * length(view) * length(up))
+        camera.reject("up", "is parallel to the view from position_m to look_at_m: choose another direction");
 }
 
 CameraConfig read_camera(TomlSection& camera) {
@@ -113,10 +142,7 @@ CameraConfig read_camera(TomlSection& camera) {
     camera.read_choice<ExposureMode>("exposure_mode", config.exposure_mode,
                                      {{"trigger_width", ExposureMode::trigger_width}, {"timed", ExposureMode::timed}});
     camera.read("exposure_us", config.exposure_us, 0.1, 1e6);
-    camera.read("position_m", config.position_m);
-    camera.read("look_at_m", config.look_at_m);
-    camera.read("up", config.up);
-    camera.read("vertical_fov_deg", config.vertical_fov_deg, 0.1, 170);
+    read_view(camera, config);
     camera.read("vignetting", config.vignetting, 0, 1);
     camera.read("counts_per_us", config.counts_per_us, 1e-6, 1e6);
     return config;
@@ -144,10 +170,18 @@ Result<StageConfig> read_stage(const std::string& path) {
     if (!stage.calibration_dir.empty()) stage.calibration_dir = file->resolve_path(stage.calibration_dir);
     if (file->has("camera")) {
         stage.cameras.clear();
-        for (auto& camera : file->sections("camera")) stage.cameras.push_back(read_camera(camera));
+        for (auto& camera : file->sections("camera", cameras_max)) stage.cameras.push_back(read_camera(camera));
     }
     if (const Status status = file->finish(); !status.ok()) return status.error();
     return stage;
+}
+
+Status check_chain(const StageConfig& stage) {
+    if (int(stage.chain_bit_of_lamp.size()) >= stage.lamp_count()) return Done{};
+    return fail(
+        fmt::format("the stage has {} lamps and a board's chain drives {}: such a stage can be rendered (`stagesim "
+                    "render`), not played",
+                    stage.lamp_count(), OLS_CHAIN_BITS_MAX));
 }
 
 }  // namespace ols

@@ -35,13 +35,13 @@ struct CameraConfig : CameraSetup {
 };
 
 struct StageConfig {
-    std::vector<LightPosition> lamps;  // sphere lamps, names lamp_000 ...
-    double radius_m = 1.0;             // lamps' distance from the centre
-    double lamp_beam_exponent = 1.2;   // beam falls off as cos^n off the lamp's axis, which points at the centre
-    LampResponse lamp_response;        // of every lamp with its driver
-    std::vector<Vec3> matte_lamps_m;   // the matte board's lamps, absolute positions
-    int chain_bits = 176;
-    std::vector<int> chain_bit_of_lamp;  // sphere lamps first, then matte lamps
+    std::vector<LightPosition> lamps;    // sphere lamps, names lamp_000 ...
+    double radius_m = 1.0;               // lamps' distance from the centre
+    double lamp_beam_exponent = 1.2;     // beam falls off as cos^n off the lamp's axis, which points at the centre
+    LampResponse lamp_response;          // of every lamp with its driver
+    std::vector<Vec3> matte_lamps_m;     // the matte board's lamps, absolute positions
+    int chain_bits = 176;                // 0: no chain, see check_chain()
+    std::vector<int> chain_bit_of_lamp;  // sphere lamps first, then matte lamps; none without a chain
     std::string board = "";              // "socket:PATH"
     std::vector<CameraConfig> cameras;
     std::string calibration_dir = "";  // "" = none yet
@@ -54,6 +54,10 @@ StageConfig default_stage();
 
 // Reads stage.toml; every key has the default of default_stage(). `[lamps] lp = "file.lp"` replaces the geometry (paths
 // are relative to the file). Unknown keys and values out of range are errors that name file, line and key.
+// Without a [chain] lamp i is bit i; more lamps than a chain can have are then read, too, without a chain.
 Result<StageConfig> read_stage(const std::string& path);
+
+// Whether a board can play the stage. The error says what else can be done with it.
+Status check_chain(const StageConfig& stage);
 
 }  // namespace ols

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Strict reading of TOML over toml++; its exceptions are off and its types stay in this file.
+// Strict reading of TOML over toml++; its exceptions and its types stay in this file.
 #include "stage/toml_section.hpp"
 
-#define TOML_EXCEPTIONS 0
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,21 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <stdexcept>
+
+#include "image/bounded_file.hpp"
+#include "stage/toml_outline.hpp"
+
+// toml++ 3.3 asserts what some texts do not hold. Its asserts are thrown, in builds without asserts, too, and with exceptions
+// an error ends the parsing where it is found.
+[[noreturn]] static void toml_assert_failed() {
+    throw std::logic_error(
+        "this is no TOML, and its parser cannot say which line: look for brackets that name nothing");
+}
+#undef NDEBUG
+#define TOML_ASSERT(expression) ((expression) ? void() : toml_assert_failed())
+#define TOML_EXCEPTIONS 1
+#include <toml++/toml.h>
 
 namespace ols {
 
@@ -29,12 +42,30 @@ struct TomlSection::File {
 
 namespace {
 
+constexpr uint64_t file_bytes_max = 4 << 20;  // a cycle of 1024 slots with a level for each of 256 lamps takes 1.3 MB
+constexpr size_t text_bytes_max = 4096, list_entries_max = 4096;
+
 const toml::table& as_table(const void* table) {
     return *static_cast<const toml::table*>(table);
 }
 
 const toml::node* as_node(const void* node) {
     return static_cast<const toml::node*>(node);
+}
+
+// A whole number is a number, too; true, a text or a date are none.
+std::optional<double> number_of(const toml::node& node) {
+    if (const auto whole = node.value_exact<int64_t>()) return double(*whole);
+    return node.value_exact<double>();
+}
+
+bool lies_in(double value, double min, double max) {
+    return value >= min && value <= max;  // false for NaN
+}
+
+bool is_plain(const std::string& text) {
+    return text.size() <= text_bytes_max &&
+           std::none_of(text.begin(), text.end(), [](char c) { return (c >= 0 && c < ' ') || c == 127; });
 }
 
 // How many letters must be put in, left out or changed to make one word of the other (Levenshtein 1966).
@@ -88,15 +119,18 @@ TomlSection::TomlSection(std::shared_ptr<File> file, const void* table, std::str
     : file_(std::move(file)), table_(table), prefix_(std::move(prefix)) {}
 
 Result<TomlSection> TomlSection::open(const std::string& path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-        return fail("cannot open '" + path + "': there is no such file; check the path");
-    toml::parse_result parsed = toml::parse_file(path);
-    if (!parsed)
-        return fail(fmt::format("{}:{}: {}", path, parsed.error().source().begin.line, parsed.error().description()));
+    const auto text = read_bounded_file(path, "configuration", file_bytes_max);
+    if (!text) return text.error();
+    if (const Status bounded = check_toml_outline(path, *text); !bounded) return bounded.error();
     auto file = std::make_shared<File>();
     file->path = path;
-    file->root = std::move(parsed).table();
+    try {
+        file->root = toml::parse(*text, path);
+    } catch (const toml::parse_error& e) {
+        return fail(fmt::format("{}:{}: {}", path, e.source().begin.line, e.description()));
+    } catch (const std::exception& e) {
+        return fail(fmt::format("cannot read '{}': {}", path, e.what()));
+    }
     const void* root = &file->root;
     return TomlSection(std::move(file), root, "");
 }
@@ -121,19 +155,25 @@ void TomlSection::reject(const std::string& key, const std::string& what) {
 void TomlSection::read(const std::string& key, double& value, double min, double max) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
-    const auto number = node->value<double>();
-    if (!number || !std::isfinite(*number) || *number < min || *number > max)
+    const auto number = number_of(*node);
+    if (!number || !lies_in(*number, min, max))
         return reject(key, fmt::format("must be a number from {} to {}", min, max));
     value = *number;
 }
 
-void TomlSection::read(const std::string& key, int& value, int min, int max) {
+void TomlSection::read(const std::string& key, int64_t& value, int64_t min, int64_t max) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
     const auto number = node->value_exact<int64_t>();
     if (!number || *number < min || *number > max)
         return reject(key, fmt::format("must be a whole number from {} to {}", min, max));
-    value = int(*number);
+    value = *number;
+}
+
+void TomlSection::read(const std::string& key, int& value, int min, int max) {
+    int64_t number = value;
+    read(key, number, int64_t(min), int64_t(max));
+    value = int(number);
 }
 
 void TomlSection::read(const std::string& key, bool& value) {
@@ -148,44 +188,69 @@ void TomlSection::read(const std::string& key, std::string& value) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
     const auto text = node->value_exact<std::string>();
-    if (!text) return reject(key, "must be a text in quotes");
+    if (!text || !is_plain(*text))
+        return reject(key, fmt::format("must be a text in quotes, of at most {} bytes and without control characters",
+                                       text_bytes_max));
     value = *text;
+}
+
+// The entries of a list, each made by `entry` of its node; nothing if one of them is none, or there are too many.
+template <typename T, typename Entry>
+static std::optional<std::vector<T>> list_of(const toml::node& node, size_t most, const Entry& entry) {
+    const toml::array* list = node.as_array();
+    if (!list || list->size() > most) return std::nullopt;
+    std::vector<T> values;
+    for (const toml::node& each : *list) {
+        const std::optional<T> value = entry(each);
+        if (!value) return std::nullopt;
+        values.push_back(*value);
+    }
+    return values;
 }
 
 void TomlSection::read(const std::string& key, std::vector<int>& value, int min, int max) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
-    std::vector<int> numbers;
-    if (const auto* list = node->as_array())
-        for (const auto& entry : *list)
-            if (const auto number = entry.value_exact<int64_t>(); number && *number >= min && *number <= max)
-                numbers.push_back(int(*number));
-    if (!node->is_array() || numbers.size() != node->as_array()->size())
-        return reject(key, fmt::format("must be a list of whole numbers from {} to {}", min, max));
-    value = std::move(numbers);
+    auto numbers = list_of<int>(*node, list_entries_max, [&](const toml::node& entry) -> std::optional<int> {
+        const auto number = entry.value_exact<int64_t>();
+        if (!number || *number < min || *number > max) return std::nullopt;
+        return int(*number);
+    });
+    if (!numbers)
+        return reject(
+            key, fmt::format("must be a list of at most {} whole numbers from {} to {}", list_entries_max, min, max));
+    value = std::move(*numbers);
 }
 
 void TomlSection::read(const std::string& key, std::vector<std::string>& value) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
-    std::vector<std::string> texts;
-    if (const auto* list = node->as_array())
-        for (const auto& entry : *list)
-            if (const auto text = entry.value_exact<std::string>()) texts.push_back(*text);
-    if (!node->is_array() || texts.size() != node->as_array()->size()) return reject(key, "must be a list of texts");
-    value = std::move(texts);
+    auto texts = list_of<std::string>(*node, list_entries_max, [](const toml::node& entry) {
+        auto text = entry.value_exact<std::string>();
+        return text && is_plain(*text) ? text : std::nullopt;
+    });
+    if (!texts) return reject(key, fmt::format("must be a list of at most {} texts", list_entries_max));
+    value = std::move(*texts);
 }
 
-void TomlSection::read(const std::string& key, std::array<double, 3>& value) {
+void TomlSection::read(const std::string& key, std::array<double, 3>& value, double min, double max) {
     const toml::node* node = as_node(find(key));
     if (!node) return;
-    std::vector<double> numbers;
-    if (const auto* list = node->as_array())
-        for (const auto& entry : *list)
-            if (const auto number = entry.value<double>(); number && std::isfinite(*number)) numbers.push_back(*number);
-    if (!node->is_array() || numbers.size() != 3 || node->as_array()->size() != 3)
-        return reject(key, "must be a list of three numbers");
-    std::copy(numbers.begin(), numbers.end(), value.begin());
+    const auto numbers = list_of<double>(*node, 3, [&](const toml::node& entry) {
+        const auto number = number_of(entry);
+        return number && lies_in(*number, min, max) ? number : std::nullopt;
+    });
+    if (!numbers || numbers->size() != 3)
+        return reject(key, fmt::format("must be a list of three numbers from {} to {}", min, max));
+    std::copy(numbers->begin(), numbers->end(), value.begin());
+}
+
+void TomlSection::read_direction(const std::string& key, std::array<double, 3>& value) {
+    std::array<double, 3> read_value = value;
+    read(key, read_value, -direction_max, direction_max);
+    if (std::hypot(read_value[0], read_value[1], read_value[2]) < 1e-6)
+        return reject(key, "must be longer than 0.000001: it is a direction");
+    value = read_value;
 }
 
 TomlSection TomlSection::section(const std::string& key) {
@@ -196,7 +261,7 @@ TomlSection TomlSection::section(const std::string& key) {
     return TomlSection(file_, table, prefix_ + key + ".");
 }
 
-std::vector<TomlSection> TomlSection::sections(const std::string& key) {
+std::vector<TomlSection> TomlSection::sections(const std::string& key, size_t most) {
     std::vector<TomlSection> found;
     const toml::node* node = as_node(find(key));
     if (!node) return found;
@@ -205,6 +270,10 @@ std::vector<TomlSection> TomlSection::sections(const std::string& key) {
         for (const auto& entry : *list)
             if (const auto* table = entry.as_table()) found.push_back(TomlSection(file_, table, prefix_ + key + "."));
     if (!list || found.size() != list->size()) reject(key, "must be tables: write [[" + prefix_ + key + "]]");
+    if (found.size() > most) {
+        reject(key, fmt::format("has {} tables and may have {}", found.size(), most));
+        found.clear();
+    }
     return found;
 }
 

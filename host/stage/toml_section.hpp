@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -14,20 +15,26 @@
 namespace ols {
 
 // A table of a TOML file. The read functions leave `value` as it is when the key is absent (so that the default stands)
-// or wrong; the first thing that is wrong anywhere in the file is kept and returned by finish().
+// or wrong; the first thing that is wrong anywhere in the file is kept and returned by finish(). Every number is read with the
+// range that it may have, both ends included: nothing outside of it, no NaN and no other type comes through.
 class TomlSection {
   public:
-    // Parses a file and returns its root table.
+    // Parses a file and returns its root table. Errors: no regular file, more than 4 MiB, nested deeper than toml_outline.hpp
+    // allows, no TOML.
     static Result<TomlSection> open(const std::string& path);
 
     bool has(const std::string& key) const;
     void read(const std::string& key, double& value, double min, double max);
     void read(const std::string& key, int& value, int min, int max);
+    void read(const std::string& key, int64_t& value, int64_t min, int64_t max);
     void read(const std::string& key, bool& value);
-    void read(const std::string& key, std::string& value);
+    void read(const std::string& key, std::string& value);  // of one line
     void read(const std::string& key, std::vector<int>& value, int min, int max);
     void read(const std::string& key, std::vector<std::string>& value);
-    void read(const std::string& key, std::array<double, 3>& value);
+    void read(const std::string& key, std::array<double, 3>& value, double min, double max);
+
+    // A vector of any length but zero.
+    void read_direction(const std::string& key, std::array<double, 3>& value);
 
     // A word that stands for a value, such as the name of a colour filter layout.
     template <typename T>
@@ -48,8 +55,8 @@ class TomlSection {
     // The table under `key`; an empty one when it is absent.
     TomlSection section(const std::string& key);
 
-    // The tables of `[[key]]`; none when it is absent.
-    std::vector<TomlSection> sections(const std::string& key);
+    // The tables of `[[key]]`, of which there may be so many; none when it is absent.
+    std::vector<TomlSection> sections(const std::string& key, size_t most);
 
     // Notes that a value is wrong in a way the read functions cannot know: `what` follows "file:line: key ".
     void reject(const std::string& key, const std::string& what);
@@ -60,6 +67,8 @@ class TomlSection {
 
     // A path of the file made relative to the file's own folder.
     std::string resolve_path(const std::string& path) const;
+
+    static constexpr double direction_max = 1e6;  // of its coordinates
 
   private:
     struct File;

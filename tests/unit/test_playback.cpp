@@ -79,7 +79,7 @@ TEST(Playback, what_cannot_be_played_is_an_error_that_names_line_and_key) {
     expect_error("[[trigger]]\nline = 4\n", "2", "trigger.line must be a whole number from 0 to 3");
     expect_error("[[trigger]]\nline = 1\n[[trigger]]\nline = 1\n", "4", "has a table already");
     expect_error("[[trigger]]\nline = 1\nkinds = [\"flash\"]\n", "3", "'flash', which is none of");
-    expect_error("[[trigger]]\nline = 1\nkinds = 3\n", "3", "must be a list of texts");
+    expect_error("[[trigger]]\nline = 1\nkinds = 3\n", "3", "must be a list of at most 4096 texts");
     expect_error("basis = \"single\"\n" + a_slot, "2", "exclude each other");
     expect_error("[[slot]]\nkind = \"basis\"\n", "1", "slot.exposure_us is missing");
     expect_error(a_slot + "period_us = 90\n", "2", "does not fit the period of 90 us");

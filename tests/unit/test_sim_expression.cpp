@@ -46,7 +46,7 @@ constexpr const char* dented =
 }  // namespace
 
 TEST_F(Expressions, move_the_vertices_that_the_file_numbers_whatever_order_faces_name_them_in) {
-    const auto mesh = read_obj(folder_ / "square.obj");
+    const auto mesh = read_mesh(folder_ / "square.obj");
     const auto target = read_target(folder_ / "dent.target", *mesh);
     ASSERT_TRUE(target) << target.error().message;
     const Expression dent{"dent", *target, {}, 0};
@@ -112,7 +112,7 @@ TEST_F(Expressions, geometry_does_not_depend_on_where_it_was_before) {
 }
 
 TEST_F(Expressions, of_what_cannot_be_used_are_errors_that_say_where) {
-    const auto mesh = read_obj(folder_ / "square.obj");
+    const auto mesh = read_mesh(folder_ / "square.obj");
     const auto complaint = [&](const std::string& text) {
         const auto target = read_target(write("bad.target", text), *mesh);
         return target ? "" : target.error().message;

@@ -21,7 +21,7 @@ const std::vector<Keyframe> quarter_turn = {{1000, {0, 0, 0}, rotation_about({0,
 TEST(Motion, halfway_in_time_is_halfway_in_place_and_angle) {
     const Pose pose = pose_at(quarter_turn, 2000);
     // +z turned by 45 degrees about +y goes towards +x.
-    const Float3 turned = pose.turn({0, 0, 1});
+    const Float3 turned = pose.turn(Float3{0, 0, 1});
     EXPECT_NEAR(turned.x, std::sqrt(0.5), 1e-6);
     EXPECT_NEAR(turned.z, std::sqrt(0.5), 1e-6);
     const Float3 moved = pose.point({});
@@ -34,7 +34,7 @@ TEST(Motion, rotation_is_uniform_along_the_shorter_way) {
     const std::vector<Keyframe> keyframes = {{0, {}, rotation_about({0, 0, 1}, 0)},
                                              {10, {}, rotation_about({0, 0, 1}, 350)}};
     for (int step = 0; step <= 10; ++step) {
-        const Float3 turned = pose_at(keyframes, step).turn({1, 0, 0});
+        const Float3 turned = pose_at(keyframes, step).turn(Float3{1, 0, 0});
         EXPECT_NEAR(std::atan2(turned.y, turned.x) * 180 / std::numbers::pi, -step, 1e-4);
     }
 }

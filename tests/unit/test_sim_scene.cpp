@@ -29,7 +29,7 @@ class SceneFiles : public testing::Test {
         return scene.ok() ? "" : scene.error().message;
     }
     std::string mesh_error(const std::string& text) {
-        const auto mesh = read_obj(write("mesh.obj", text));
+        const auto mesh = read_mesh(write("mesh.obj", text));
         return mesh.ok() ? "" : mesh.error().message;
     }
 
@@ -83,9 +83,9 @@ TEST_F(SceneFiles, mistakes_are_named_with_file_line_and_key) {
 
 TEST_F(SceneFiles, meshes_have_smooth_normals_masks_and_groups) {
     // A square pyramid without its base: the apex normal is +z by symmetry.
-    const auto mesh = read_obj(write("pyramid.obj",
-                                     "v 1 1 0 1 0 0\r\nv -1 1 0\nv -1 -1 0\nv 1 -1 0\nv 0 0 1 0.25 0.5 0.75\n"
-                                     "g north\nf 1/7 2/8 5/9\nf 2 3 5\ng south\nf -3 -2 -1\nf 4 1 5\n"));
+    const auto mesh = read_mesh(write("pyramid.obj",
+                                      "v 1 1 0 1 0 0\r\nv -1 1 0\nv -1 -1 0\nv 1 -1 0\nv 0 0 1 0.25 0.5 0.75\n"
+                                      "g north\nf 1/7 2/8 5/9\nf 2 3 5\ng south\nf -3 -2 -1\nf 4 1 5\n"));
     ASSERT_TRUE(mesh.ok()) << mesh.error().message;
     ASSERT_EQ(mesh->triangles.size(), 4u);
     EXPECT_EQ(mesh->groups, (std::vector<std::string>{"north", "south"}));
@@ -99,7 +99,7 @@ TEST_F(SceneFiles, meshes_have_smooth_normals_masks_and_groups) {
 
 TEST_F(SceneFiles, polygons_become_fans_and_given_normals_are_kept) {
     const auto mesh =
-        read_obj(write("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 2\nvn 1 0 0\nf 1//1 2//1 3//1 4//2\n"));
+        read_mesh(write("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 2\nvn 1 0 0\nf 1//1 2//1 3//1 4//2\n"));
     ASSERT_TRUE(mesh.ok()) << mesh.error().message;
     EXPECT_EQ(mesh->triangles.size(), 2u);
     EXPECT_EQ(mesh->normals[0], (Float3{0, 0, 1}));
@@ -113,5 +113,5 @@ TEST_F(SceneFiles, broken_meshes_are_errors_that_name_the_line) {
     EXPECT_NE(mesh_error("v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 0\n").find(":4:"), std::string::npos);
     EXPECT_NE(mesh_error("v 0 0 0\nv 0 0 0\nf 1 2\n").find(":3:"), std::string::npos);
     EXPECT_NE(mesh_error("v 0 0 0\n").find("no faces"), std::string::npos);
-    EXPECT_NE(read_obj("/nonexistent.obj").error().message.find("make assets"), std::string::npos);
+    EXPECT_NE(read_mesh("/nonexistent.obj").error().message.find("make assets"), std::string::npos);
 }

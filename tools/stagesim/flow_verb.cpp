@@ -66,8 +66,12 @@ void add_flow_verb(CLI::App& app, int& exit_code) {
         "lasts 83333 us.\nExample: stagesim flow tools/stagesim/scenes/motion_turn60.toml --from-us 0 --to-us 83333 -o "
         "flow.exr");
     add_input_options(*verb, options->inputs);
-    verb->add_option("--from-us", options->from_us, "the moment whose pixels are followed")->required();
-    verb->add_option("--to-us", options->to_us, "the moment at which they are found again")->required();
+    verb->add_option("--from-us", options->from_us, "the moment whose pixels are followed")
+        ->required()
+        ->check(number_from(-1e12, 1e12));
+    verb->add_option("--to-us", options->to_us, "the moment at which they are found again")
+        ->required()
+        ->check(number_from(-1e12, 1e12));
     verb->add_option("-o,--out", options->out, "EXR file")->required();
     verb->add_flag("--json", options->json, "say what was found as JSON");
     verb->callback([options, &exit_code] {

@@ -2,12 +2,14 @@
 // stagesim render: pictures of a scene without sensor and noise, the truth that recorded takes are held against.
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
+#include "image/bounded_file.hpp"
 #include "image/exr.hpp"
 #include "image/json_object.hpp"
 #include "image/outputs.hpp"
@@ -33,24 +35,39 @@ struct RenderOptions {
     double rotate_deg = 0, exposure_ev = 0, time_us = 0, png_gain = 1;
 };
 
+constexpr double weight_max = 1e6;
+constexpr uint64_t weights_bytes_max = 16 << 20;
+
+// A number or three of them, within weight_max.
+std::optional<Float3> weight_of(const nlohmann::json& entry) {
+    std::array<float, 3> rgb;
+    if (entry.is_array() && entry.size() != 3) return std::nullopt;
+    for (size_t c = 0; c < 3; ++c) {
+        const nlohmann::json& value = entry.is_array() ? entry[c] : entry;
+        if (!value.is_number() || !(std::abs(value.get<double>()) <= weight_max)) return std::nullopt;
+        rgb[c] = value.get<float>();
+    }
+    return Float3{rgb[0], rgb[1], rgb[2]};
+}
+
 // `{"weights": [w, ...]}` or `{"weights": [[r, g, b], ...]}`, one for each lamp from 0; the rest is dark.
 Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) {
-    std::ifstream file(path, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
-    if (!file) return fail("cannot read '" + path + "': check the path");
-    const auto parsed = parse_json(text, "'" + path + "'");
-    if (!parsed) return parsed.error();
-    const nlohmann::json entries = parsed->is_object() ? parsed->value("weights", nlohmann::json()) : nlohmann::json();
+    const auto text = read_bounded_file(path, "weights", weights_bytes_max);
+    if (!text) return text.error();
+    const auto json = parse_json(*text, "'" + path + "'");
+    if (!json) return json.error();
     const Error wrong =
-        fail(fmt::format("'{}' must hold {{\"weights\": [...]}} with at most {} numbers or [r, g, b]", path, lamps));
-    if (!entries.is_array() || entries.size() > lamps) return wrong;
+        fail(fmt::format("'{}' must hold {{\"weights\": [...]}} and nothing else, with at most {} numbers "
+                         "or [r, g, b] from {} to {}",
+                         path, lamps, -weight_max, weight_max));
+    if (!json->is_object() || json->size() != 1 || !json->contains("weights") || !(*json)["weights"].is_array()) return wrong;
+    const nlohmann::json& entries = (*json)["weights"];
+    if (entries.size() > lamps) return wrong;
     std::vector<Float3> weights(lamps);
     for (size_t i = 0; i < entries.size(); ++i) {
-        const auto& entry = entries[i];
-        const bool rgb = entry.is_array() && entry.size() == 3;
-        for (const auto& value : rgb ? entry : nlohmann::json::array({entry}))
-            if (!value.is_number()) return wrong;
-        weights[i] = rgb ? Float3{entry[0], entry[1], entry[2]} : Float3{entry, entry, entry};
+        const auto weight = weight_of(entries[i]);
+        if (!weight) return wrong;
+        weights[i] = *weight;
     }
     return weights;
 }
@@ -124,6 +141,19 @@ std::string lamp_file(const RenderOptions& options, size_t lamp) {
     return fmt::format("{}/lamp_{:03}.exr", options.out, lamp);
 }
 
+std::string lights_file(const RenderOptions& options) {
+    return options.out + "/lights.lp";
+}
+
+// The pictures of the sphere's lamps with their lights: the folder is then ready for `stagectl ingest`.
+Status write_lights(const RenderOptions& options, const StageConfig& stage) {
+    std::vector<LightPosition> lights;
+    for (size_t lamp = 0; lamp < stage.lamps.size(); ++lamp)
+        lights.push_back(
+            {std::filesystem::path(lamp_file(options, lamp)).filename().string(), stage.lamps[lamp].direction});
+    return write_lp(lights_file(options), lights);
+}
+
 Status render_olat(const RenderOptions& options, Renderer& renderer, const CameraConfig& camera) {
     for (size_t lamp = 0; lamp < renderer.lamp_count(); ++lamp) {
         std::vector<Float3> weights(renderer.lamp_count());
@@ -131,6 +161,7 @@ Status render_olat(const RenderOptions& options, Renderer& renderer, const Camer
         const Status written =
             write_picture(options, renderer.light(weights, options.time_us), camera, lamp_file(options, lamp));
         if (!written) return written;
+        renderer.forget_light();  // a thousand lamps' images would not fit
         show_progress("lamps", double(lamp + 1) / double(renderer.lamp_count()));
     }
     return Done{};
@@ -145,10 +176,12 @@ Status make_folder(const std::string& path) {
 
 Status check_files(const RenderOptions& options, size_t lamps) {
     Outputs outputs{.inputs = {options.inputs.scene, options.inputs.stage, options.weights, options.env}};
-    if (options.olat)
+    if (options.olat) {
         for (size_t lamp = 0; lamp < lamps; ++lamp) outputs.files.push_back(lamp_file(options, lamp));
-    else
+        outputs.files.push_back(lights_file(options));
+    } else {
         outputs.exr = {options.out}, outputs.png = {options.png};
+    }
     return check_outputs(outputs);
 }
 
@@ -156,7 +189,10 @@ nlohmann::json report(const RenderOptions& options, const Inputs& inputs, size_t
                       const std::vector<std::string>& warnings) {
     nlohmann::json report = {{"output", options.out},          {"png", options.png},   {"width", inputs.camera.width},
                              {"height", inputs.camera.height}, {"unit", options.unit}, {"at_us", options.time_us}};
-    if (options.olat) report["pictures"] = lamps;
+    if (options.olat) {
+        report["pictures"] = lamps;
+        report["lights"] = lights_file(options);
+    }
     report["warnings"] = warnings;
     return report;
 }
@@ -177,6 +213,8 @@ Status render(const RenderOptions& options) {
     const Status done =
         options.olat ? render_olat(options, renderer, inputs->camera)
                      : write_picture(options, renderer.light(*weights, options.time_us), inputs->camera, options.out);
+    if (done && options.olat)
+        if (const Status listed = write_lights(options, inputs->stage); !listed) return listed;
     if (done && options.json) print_json(report(options, *inputs, lamps, warnings));
     return done;
 }
@@ -197,19 +235,25 @@ void add_render_verb(CLI::App& app, int& exit_code) {
     light->add_flag("--all-lamps", options->all_lamps, "every lamp of the sphere at 1");
     light->add_option("--weights", options->weights, "JSON file {\"weights\": [w or [r, g, b], ...]}");
     light->add_option("--env", options->env, "environment map (.exr, .hdr): lamps weighted as `rf relight` does");
-    auto* olat = light->add_flag("--olat", options->olat, "one picture a lamp, into the folder of -o");
+    auto* olat = light->add_flag(
+        "--olat", options->olat,
+        "one picture a lamp, into the folder of -o, and lights.lp: the directions of the sphere's lamps");
     light->require_option(1);
     verb->add_option("--env-convention", options->env_convention, "openexr, mirrored or angular");
     verb->add_option("--part", options->env_picture.part, "part of an environment map of several, by name or number");
     verb->add_option("--layer", options->env_picture.layer, "layer of an environment map of several");
     verb->add_option("--rotate", options->rotate_deg,
-                     "turn the environment about +Y, degrees: light from +Z moves to +X");
-    verb->add_option("--exposure", options->exposure_ev, "stops, of the environment");
-    verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene");
+                     "turn the environment about +Y, degrees: light from +Z moves to +X")
+        ->check(number_from(-36000.0, 36000.0));
+    verb->add_option("--exposure", options->exposure_ev, "stops, of the environment")
+        ->check(number_from(-100.0, 100.0));
+    verb->add_option("--at-us,--time-us", options->time_us, "moment of a moving scene")
+        ->check(number_from(-1e12, 1e12));
     verb->add_option("--unit", options->unit, "of the EXR")->check(CLI::IsMember({"reflectance", "counts"}));
     verb->add_option("-o,--out", options->out, "EXR file (a folder with --olat), 32-bit float");
     verb->add_option("--png", options->png, "preview file, of one picture")->excludes(olat);
-    verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve");
+    verb->add_option("--png-gain", options->png_gain, "factor before the preview's tone curve")
+        ->check(number_from(0.0, 1e9));
     verb->add_flag("--json", options->json, "print what was written as JSON");
     verb->callback([options, &exit_code] {
         const Status status = options->out.empty() && options->png.empty()

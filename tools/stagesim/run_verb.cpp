@@ -78,6 +78,7 @@ class StageRun {
         auto inputs = read_inputs(options_.inputs);
         if (!inputs) return inputs.error();
         inputs_ = std::move(*inputs);
+        if (const Status playable = check_chain(inputs_.stage); !playable) return playable;
         const Status writable =
             check_outputs({.inputs = {options_.inputs.scene, options_.inputs.stage, options_.image, options_.faults},
                            .streams = {options_.vcd}});

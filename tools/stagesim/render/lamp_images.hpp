@@ -21,6 +21,9 @@ class LampImages {
     // Lamps are summed in ascending order.
     void add_weighted(const std::vector<Float3>& weights, Image& sum) const;
 
+    // Lets go of all lamps' images.
+    void forget() { images_.assign(images_.size(), {}); }
+
     bool has(uint32_t lamp) const { return !images_[lamp].empty(); }
     const VisiblePoints& points() const { return points_; }
     int channels() const { return channels_; }

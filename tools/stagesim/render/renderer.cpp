@@ -52,6 +52,11 @@ void Renderer::place(double time_us) {
     images_ = std::make_unique<LampImages>(std::move(points), lamps_.size(), channels());
 }
 
+void Renderer::forget_light() {
+    if (images_) images_->forget();
+    sums_.forget();
+}
+
 void Renderer::render(const std::vector<uint32_t>& lamps) {
     const Stopwatch stopwatch(cost_.lamps_s);
     for (const uint32_t lamp : lamps)

@@ -36,6 +36,9 @@ class Renderer {
     // Shades every lamp of a still scene now, so that exposures cost only sums; `progress` gets 0 to 1.
     void render_all_lamps(const std::function<void(double)>& progress);
 
+    // Lets go of what was rendered of lamps. It is rendered anew when it is asked for, the same to the bit.
+    void forget_light();
+
     // Poses the scene as it is at a time and finds what is seen of it, as every picture does by itself. Done beforehand, the first
     // picture of a moving scene need not make its looks as well, which takes as long as several pictures.
     void place(double time_us);

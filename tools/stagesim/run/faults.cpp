@@ -6,11 +6,13 @@
 
 namespace ols {
 
+constexpr static size_t faults_max = 10'000;
+
 Result<std::vector<Fault>> read_faults(const std::string& path) {
     auto file = TomlSection::open(path);
     if (!file) return file.error();
     std::vector<Fault> faults;
-    for (TomlSection& section : file->sections("fault")) {
+    for (TomlSection& section : file->sections("fault", faults_max)) {
         Fault fault{FaultKind::drop_frame};
         int camera = 0, trigger = 0, by = 1;
         if (!section.has("kind")) section.reject("kind", "is missing");

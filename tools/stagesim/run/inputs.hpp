@@ -19,6 +19,9 @@ struct InputOptions {
 
 void add_input_options(CLI::App& verb, InputOptions& options);
 
+// Lets through numbers of a range, both ends included, and nothing else: no NaN.
+CLI::Validator number_from(double min, double max);
+
 struct Inputs {
     Scene scene;
     StageConfig stage;
@@ -27,7 +30,8 @@ struct Inputs {
     Setup setup(bool camera_model) const { return {scene, stage, camera, camera_model}; }
 };
 
-// Reads what the options name; without --stage it is the default stage.
+// Reads what the options name; without --stage it is the default stage. Says on standard error what of the scene's files is not
+// used. Errors: also a camera and samples that this machine's memory cannot hold.
 Result<Inputs> read_inputs(const InputOptions& options);
 
 // A bar on a terminal, nothing elsewhere; 1 ends it.

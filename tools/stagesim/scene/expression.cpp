@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <numbers>
+#include <optional>
 #include <sstream>
+
+#include "image/bounded_file.hpp"
+#include "scene/numbers.hpp"
 
 namespace ols {
 
@@ -26,30 +29,37 @@ std::vector<std::vector<uint32_t>> vertices_of_file(const Mesh& mesh) {
 
 }  // namespace
 
-Result<MeshTarget> read_target(const std::string& path, const Mesh& mesh) {
-    std::ifstream file(path);
-    if (!file) return fail("cannot open target '" + path + "': check the path (the head's come with `make assets`)");
+Result<MeshTarget> read_target(const std::string& path, const Mesh& mesh, const MeshPlacement& placement) {
+    const auto bytes = read_bounded_file(path, "target", mesh_bytes_max);
+    if (!bytes) return fail(bytes.error().message + " (the head's come with `make assets`)");
+    const Pose turned{placement.rotation, {}};
     const auto vertices = vertices_of_file(mesh);
     MeshTarget target;
     std::vector<bool> seen(vertices.size(), false);
+    std::istringstream file(*bytes);
     std::string line;
     for (int number = 1; std::getline(file, line); ++number) {
-        if (line.empty() || line[0] == '#') continue;
-        std::istringstream words(line);
-        int64_t vertex = -1;
-        Float3 offset;
-        std::string rest;
-        const bool numbers = bool(words >> vertex >> offset.x >> offset.y >> offset.z) && !(words >> rest);
-        if (!numbers || !std::isfinite(dot(offset, offset)))
-            return fail(fmt::format("{}:{}: '{}' is not `vertex dx dy dz`", path, number, line.substr(0, 60)));
-        if (vertex < 0 || vertex >= int64_t(vertices.size()) || vertices[size_t(vertex)].empty())
-            return fail(fmt::format("{}:{}: the mesh has no vertex {}: was the target made for another mesh?", path,
-                                    number, vertex));
-        if (seen[size_t(vertex)]) return fail(fmt::format("{}:{}: vertex {} moves twice", path, number, vertex));
-        seen[size_t(vertex)] = true;
-        for (const uint32_t v : vertices[size_t(vertex)]) {
+        if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);
+        if (line.ends_with('\r')) line.pop_back();
+        const auto words = words_of(std::string_view(line).substr(0, line.find('#')));
+        if (words.empty()) continue;
+        const auto vertex = whole_number(words[0]);
+        std::array<std::optional<double>, 3> offset;
+        for (size_t i = 0; i < 3 && i + 1 < words.size(); ++i) offset[i] = decimal_number(words[i + 1]);
+        if (words.size() != 4 || !vertex || !offset[0] || !offset[1] || !offset[2])
+            return fail(fmt::format("{}:{}: '{:.60}' is not `vertex dx dy dz`", path, number, line));
+        if (*vertex < 0 || *vertex >= int64_t(vertices.size()) || vertices[size_t(*vertex)].empty())
+            return fail(
+                fmt::format("{}:{}: the mesh has no vertex {} in its faces: was the target made for another mesh?",
+                            path, number, *vertex));
+        if (seen[size_t(*vertex)]) return fail(fmt::format("{}:{}: vertex {} moves twice", path, number, *vertex));
+        seen[size_t(*vertex)] = true;
+        const Vec3 moved = turned.turn(Vec3{*offset[0], *offset[1], *offset[2]} * placement.scale);
+        if (!(length(moved) <= reach_max_m))
+            return fail(fmt::format("{}:{}: moves vertex {} by more than {} m", path, number, *vertex, reach_max_m));
+        for (const uint32_t v : vertices[size_t(*vertex)]) {
             target.vertices.push_back(v);
-            target.offsets.push_back(offset);
+            target.offsets.push_back(to_float3(moved));
         }
     }
     if (target.vertices.empty()) return fail("'" + path + "' moves no vertex: it holds no line `vertex dx dy dz`");

@@ -27,9 +27,10 @@ struct Expression {
     double period_us = 0;         // the keys repeat after so long; 0: never
 };
 
-// Reads lines `vertex dx dy dz` (MakeHuman's .target format: vertices of the OBJ file counted from 0, `#` comments),
-// offsets in the OBJ's unit. Errors name file and line: no file, a bad number, a vertex the mesh lacks, nothing at all.
-Result<MeshTarget> read_target(const std::string& path, const Mesh& mesh);
+// Reads lines `vertex dx dy dz` (MakeHuman's .target format: vertices of the mesh file counted from 0, `#` comments), offsets in the
+// file's unit, which are scaled and turned with the mesh. Errors name file and line: no file, a bad number, an offset of more than
+// reach_max_m, a vertex the mesh lacks, nothing at all.
+Result<MeshTarget> read_target(const std::string& path, const Mesh& mesh, const MeshPlacement& placement = {});
 
 // From key to key along half a cosine, so that nothing jerks; held before the first and after the last. No key: 0.
 double weight_at(const Expression& expression, double time_us);

@@ -1,135 +1,176 @@
 // SPDX-License-Identifier: MIT
-// OBJ reading and smooth normals.
+// Polygons of a file to triangles in the scene, and smooth normals.
 #include "scene/mesh.hpp"
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <fstream>
-#include <iterator>
-#include <map>
-#include <optional>
-#include <string_view>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "scene/triangulate.hpp"
 
 namespace ols {
 
 namespace {
 
-using Words = std::vector<std::string_view>;
-
-Words split(std::string_view line) {
-    Words words;
-    for (size_t i = 0; (i = line.find_first_not_of(" \t\r", i)) != line.npos;) {
-        const size_t end = std::min(line.find_first_of(" \t\r", i), line.size());
-        words.push_back(line.substr(i, end - i));
-        i = end;
-    }
-    return words;
-}
-
-template <typename T>
-std::optional<T> number(std::string_view word) {
-    T value{};
-    const auto parsed = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (parsed.ec != std::errc() || parsed.ptr != word.data() + word.size()) return std::nullopt;
-    return value;
-}
-
-std::optional<Float3> triple(const Words& words, size_t first) {
-    if (words.size() < first + 3) return std::nullopt;
-    const auto x = number<float>(words[first]), y = number<float>(words[first + 1]),
-               z = number<float>(words[first + 2]);
-    if (!x || !y || !z || !std::isfinite(*x) || !std::isfinite(*y) || !std::isfinite(*z)) return std::nullopt;
-    return Float3{*x, *y, *z};
-}
-
-// An OBJ file as it is read: a vertex of the mesh is one pair of position and normal of the file.
-class ObjParser {
-  public:
-    // False when the line is not understood.
-    bool line(std::string_view text) {
-        const Words words = split(text);
-        if (words.empty()) return true;
-        if (words[0] == "v") return position(words);
-        if (words[0] == "vn") return normal(words);
-        if (words[0] == "g" || words[0] == "o") return group(words);
-        if (words[0] == "f") return face(words);
-        return true;  // texture coordinates, materials and comments have no part in this
-    }
-
-    Mesh take() {
-        mesh_.has_own_normals = !normals_.empty();
-        if (normals_.empty()) mesh_.normals = smooth_normals(mesh_.positions, mesh_.triangles);
-        return std::move(mesh_);
-    }
-
-  private:
-    bool position(const Words& words) {
-        const auto p = triple(words, 1);
-        const auto mask = words.size() >= 7 ? triple(words, 4) : Float3{};
-        if (!p || !mask) return false;
-        positions_.push_back(*p);
-        masks_.push_back(*mask);
-        return true;
-    }
-
-    bool normal(const Words& words) {
-        const auto n = triple(words, 1);
-        if (n) normals_.push_back(normalized(*n));
-        return n.has_value();
-    }
-
-    bool group(const Words& words) {
-        mesh_.groups.emplace_back(words.size() > 1 ? words[1] : "default");
-        return true;
-    }
-
-    // `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 1, or from the end if negative.
-    std::optional<uint32_t> corner(std::string_view word) {
-        int64_t index[3] = {0, 0, 0};
-        for (int part = 0; part < 3 && !word.empty(); ++part) {
-            const size_t end = std::min(word.find('/'), word.size());
-            if (end > 0) {
-                const auto value = number<int64_t>(word.substr(0, end));
-                if (!value) return std::nullopt;
-                index[part] = *value;
-            }
-            word.remove_prefix(std::min(end + 1, word.size()));
-        }
-        const auto place = [](int64_t i, size_t count) { return i < 0 ? int64_t(count) + i : i - 1; };
-        const int64_t v = place(index[0], positions_.size());
-        const int64_t n = index[2] == 0 ? -1 : place(index[2], normals_.size());
-        if (v < 0 || v >= int64_t(positions_.size()) || n >= int64_t(normals_.size())) return std::nullopt;
-        if (index[2] == 0 && !normals_.empty()) return std::nullopt;  // normals for some corners only
-        const auto [entry, is_new] = vertices_.try_emplace({v, n}, uint32_t(mesh_.positions.size()));
-        if (is_new) {
-            mesh_.positions.push_back(positions_[v]);
-            mesh_.masks.push_back(masks_[v]);
-            mesh_.file_vertices.push_back(uint32_t(v));
-            mesh_.normals.push_back(n < 0 ? Float3{} : normals_[n]);
-        }
-        return entry->second;
-    }
-
-    bool face(const Words& words) {
-        if (words.size() < 4) return false;
-        if (mesh_.groups.empty()) mesh_.groups.push_back("default");
-        std::vector<uint32_t> corners;
-        for (size_t i = 1; i < words.size(); ++i) {
-            const auto vertex = corner(words[i]);
-            if (!vertex) return false;
-            corners.push_back(*vertex);
-        }
-        const uint32_t group = uint32_t(mesh_.groups.size() - 1);
-        for (size_t i = 2; i < corners.size(); ++i)
-            mesh_.triangles.push_back({{corners[0], corners[i - 1], corners[i]}, group});
-        return true;
-    }
-
-    std::vector<Float3> positions_, masks_, normals_;
-    std::map<std::pair<int64_t, int64_t>, uint32_t> vertices_;
-    Mesh mesh_;
+// A triangle of corners of the file.
+struct Cut {
+    std::array<uint32_t, 3> corner;  // in PolygonMesh::corners
+    uint32_t group;
 };
+
+void note(std::vector<std::string>& notes, size_t count, const std::string& what) {
+    if (count > 0) notes.push_back(fmt::format("{} {}", count, what));
+}
+
+Result<std::vector<Cut>> cut_polygons(const PolygonMesh& file, std::vector<std::string>& notes) {
+    std::vector<Cut> cuts;
+    std::vector<Vec3> places;
+    std::vector<std::array<uint32_t, 3>> triangles;
+    size_t without_area = 0;
+    for (const PolygonMesh::Polygon& polygon : file.polygons) {
+        places.clear();
+        triangles.clear();
+        for (uint32_t i = 0; i < polygon.corners; ++i)
+            places.push_back(file.positions[file.corners[polygon.first + i].position]);
+        switch (triangulate(places, triangles)) {
+            case PolygonShape::simple: break;
+            case PolygonShape::without_area: ++without_area; break;
+            case PolygonShape::crosses_itself:
+                return file.error_at(polygon.place,
+                                     "crosses itself, so that nobody knows its inside: export the mesh in triangles");
+            case PolygonShape::too_large:
+                return file.error_at(polygon.place, fmt::format("has {} corners and may have {}: export the mesh in "
+                                                                "triangles",
+                                                                polygon.corners, polygon_corners_max));
+        }
+        for (const auto& [a, b, c] : triangles)
+            cuts.push_back({{polygon.first + a, polygon.first + b, polygon.first + c}, polygon.group});
+    }
+    note(notes, without_area, "faces have no area and are left out");
+    return cuts;
+}
+
+// Leaves out what stands there already: of two surfaces in one place a ray meets either.
+void remove_doubles(const PolygonMesh& file, std::vector<Cut>& cuts, std::vector<std::string>& notes) {
+    const auto places = [&](const Cut& cut) {
+        std::array<uint32_t, 3> v;
+        for (size_t i = 0; i < 3; ++i) v[i] = file.corners[cut.corner[i]].position;
+        return v;
+    };
+    const auto sorted = [&](uint32_t cut) {
+        auto v = places(cuts[cut]);
+        std::sort(v.begin(), v.end());
+        return v;
+    };
+    const auto turns_alike = [&](uint32_t first, uint32_t second) {
+        auto a = places(cuts[first]);
+        const auto b = places(cuts[second]);
+        for (int i = 0; i < 3; ++i) {
+            std::rotate(a.begin(), a.begin() + 1, a.end());
+            if (a == b) return true;
+        }
+        return false;
+    };
+    std::vector<uint32_t> order(cuts.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        const auto va = sorted(a), vb = sorted(b);
+        return va != vb ? va < vb : a < b;
+    });
+    std::vector<bool> is_double(cuts.size(), false);
+    size_t alike = 0, turned_over = 0;
+    for (size_t i = 0, first = 0; i < order.size(); ++i) {
+        if (i == 0 || sorted(order[i]) != sorted(order[first])) {
+            first = i;
+            continue;
+        }
+        is_double[order[i]] = true;
+        ++(turns_alike(order[first], order[i]) ? alike : turned_over);
+    }
+    if (alike + turned_over == 0) return;
+    size_t kept = 0;
+    for (size_t i = 0; i < cuts.size(); ++i)
+        if (!is_double[i]) cuts[kept++] = cuts[i];
+    cuts.resize(kept);
+    note(notes, alike, "triangles stand there twice: one of each is left out");
+    note(notes, turned_over, "triangles are the back of another one: surfaces have one side here, these are left out");
+}
+
+uint64_t key_of(const PolygonMesh::Corner& corner) {
+    return uint64_t(corner.position) << 32 | corner.normal;
+}
+
+// The pairs of position and normal that triangles use, each once: the vertices of the mesh.
+std::vector<uint64_t> used_pairs(const PolygonMesh& file, const std::vector<Cut>& cuts) {
+    std::vector<uint64_t> pairs;
+    pairs.reserve(3 * cuts.size());
+    for (const Cut& cut : cuts)
+        for (const uint32_t corner : cut.corner) pairs.push_back(key_of(file.corners[corner]));
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    return pairs;
+}
+
+// Vertices of the placed mesh, with the normals that the file gives them, zero where it gives none.
+Status place_vertices(const PolygonMesh& file, const std::vector<uint64_t>& pairs, const MeshPlacement& placement,
+                      Mesh& mesh) {
+    const Pose pose{placement.rotation, {}};
+    for (const uint64_t pair : pairs) {
+        const uint32_t position = uint32_t(pair >> 32), normal = uint32_t(pair);
+        const Vec3 place = pose.turn(file.positions[position] * placement.scale) + placement.position_m;
+        if (!(length(place) <= reach_max_m))
+            return fail(
+                fmt::format("'{}' reaches ({:.4g}, {:.4g}, {:.4g}) m, more than {} m from the stage's centre: "
+                            "set scale to a metre over its unit (0.001 for millimetres) and position_m",
+                            file.path, place.x, place.y, place.z, reach_max_m));
+        mesh.positions.push_back(to_float3(place));
+        mesh.file_vertices.push_back(position);
+        mesh.masks.push_back(file.colors.empty() ? Float3{} : file.colors[position]);
+        mesh.normals.push_back(normal == PolygonMesh::none ? Float3{}
+                                                           : to_float3(pose.turn(normalized(file.normals[normal]))));
+        mesh.has_own_normals |= normal != PolygonMesh::none;
+    }
+    return Done{};
+}
+
+void add_triangles(const PolygonMesh& file, const std::vector<Cut>& cuts, const std::vector<uint64_t>& pairs,
+                   Mesh& mesh) {
+    for (const Cut& cut : cuts) {
+        Triangle triangle{{}, cut.group};
+        for (size_t i = 0; i < 3; ++i) {
+            const auto found = std::lower_bound(pairs.begin(), pairs.end(), key_of(file.corners[cut.corner[i]]));
+            triangle.vertex[i] = uint32_t(found - pairs.begin());
+        }
+        mesh.triangles.push_back(triangle);
+    }
+}
+
+// Where the faces' mean has no length, for they look opposite ways, a vertex takes after the first of them.
+void fill_normals(const std::vector<uint64_t>& pairs, Mesh& mesh) {
+    const std::vector<Float3> smooth = smooth_normals(mesh.positions, mesh.triangles);
+    size_t opposite = 0;
+    for (size_t v = 0; v < pairs.size(); ++v) {
+        if (uint32_t(pairs[v]) != PolygonMesh::none) continue;
+        mesh.normals[v] = smooth[v];
+        opposite += length(smooth[v]) == 0;
+    }
+    if (opposite == 0) return;
+    for (const Triangle& t : mesh.triangles) {
+        const Float3 a = mesh.positions[t.vertex[0]];
+        const Float3 n = normalized(cross(mesh.positions[t.vertex[1]] - a, mesh.positions[t.vertex[2]] - a));
+        for (const uint32_t v : t.vertex)
+            if (length(mesh.normals[v]) == 0) mesh.normals[v] = n;
+    }
+    note(mesh.notes, opposite, "vertices lie between faces that look opposite ways: their normal is that of the first");
+}
+
+size_t unused_vertices(const PolygonMesh& file) {
+    std::vector<bool> used(file.positions.size(), false);
+    for (const PolygonMesh::Corner& corner : file.corners) used[corner.position] = true;
+    return size_t(std::count(used.begin(), used.end(), false));
+}
 
 }  // namespace
 
@@ -145,27 +186,27 @@ std::vector<Float3> smooth_normals(const std::vector<Float3>& positions, const s
     return normals;
 }
 
-Result<Mesh> read_obj(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file)
-        return fail("cannot open mesh '" + path + "': check the path (the demo's head comes with `make assets`)");
-    const std::string text((std::istreambuf_iterator<char>(file)), {});
-    ObjParser parser;
-    int number = 0;
-    for (size_t begin = 0; begin < text.size();) {
-        const size_t end = std::min(text.find('\n', begin), text.size());
-        const std::string_view line = std::string_view(text).substr(begin, end - begin);
-        ++number;
-        if (!parser.line(line))
-            return fail(
-                fmt::format("{}:{}: '{}' is no valid OBJ line: numbers must be finite, indices must name earlier "
-                            "vertices, and either all or no corners have normals",
-                            path, number, line.substr(0, 60)));
-        begin = end + 1;
-    }
-    Mesh mesh = parser.take();
-    if (mesh.triangles.empty()) return fail("'" + path + "' holds no faces: export the mesh with its polygons");
+Result<Mesh> build_mesh(const PolygonMesh& file, const MeshPlacement& placement) {
+    Mesh mesh;
+    mesh.notes = file.notes;
+    mesh.groups = file.groups;
+    mesh.has_colors = !file.colors.empty();
+    auto cuts = cut_polygons(file, mesh.notes);
+    if (!cuts) return cuts.error();
+    remove_doubles(file, *cuts, mesh.notes);
+    if (cuts->empty()) return fail("'" + file.path + "' holds no faces: export the mesh with its polygons");
+    const std::vector<uint64_t> pairs = used_pairs(file, *cuts);
+    if (const Status placed = place_vertices(file, pairs, placement, mesh); !placed) return placed.error();
+    add_triangles(file, *cuts, pairs, mesh);
+    fill_normals(pairs, mesh);
+    note(mesh.notes, unused_vertices(file), "vertices belong to no face");
     return mesh;
+}
+
+Result<Mesh> read_mesh(const std::string& path, const MeshPlacement& placement) {
+    const auto file = read_polygon_mesh(path);
+    if (!file) return file.error();
+    return build_mesh(*file, placement);
 }
 
 Mesh make_quad(Vec3 center_m, Vec3 normal, Vec3 up, double width_m, double height_m) {

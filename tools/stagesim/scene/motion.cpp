@@ -42,11 +42,15 @@ Quaternion rotation_about(Vec3 axis, double angle_deg) {
     return {std::cos(half), unit.x * s, unit.y * s, unit.z * s};
 }
 
-Float3 Pose::turn(Float3 direction) const {
+Vec3 Pose::turn(Vec3 v) const {
     // v + 2 w (u x v) + 2 u x (u x v)
-    const Vec3 u{rotation[1], rotation[2], rotation[3]}, v{direction.x, direction.y, direction.z};
+    const Vec3 u{rotation[1], rotation[2], rotation[3]};
     const Vec3 t = cross(u, v) * 2;
-    return to_float3(v + t * rotation[0] + cross(u, t));
+    return v + t * rotation[0] + cross(u, t);
+}
+
+Float3 Pose::turn(Float3 direction) const {
+    return to_float3(turn(Vec3{direction.x, direction.y, direction.z}));
 }
 
 bool Pose::operator==(const Pose& other) const {

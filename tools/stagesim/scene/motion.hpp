@@ -26,6 +26,7 @@ struct Pose {
 
     Float3 point(Float3 p) const { return turn(p) + to_float3(translation_m); }
     Float3 turn(Float3 direction) const;
+    Vec3 turn(Vec3 direction) const;
     bool operator==(const Pose&) const;
 };
 

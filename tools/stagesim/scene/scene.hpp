@@ -84,6 +84,7 @@ struct Scene {
     float texture_step_m = 0;
     uint64_t seed = 1;  // of the cameras' noise
     CameraClock clock;
+    std::vector<std::string> notes;  // what of the files is not used, and what was understood in its place
 };
 
 // Reads a scene (the format is described in tools/stagesim/scenes/README.md) and the meshes it names, relative to the
