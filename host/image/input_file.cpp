@@ -1,35 +1,48 @@
 // SPDX-License-Identifier: MIT
-// The kind is looked at before the file is opened: opening a pipe waits for whoever writes to it.
+// The kind is looked at before a file is opened: opening a pipe waits for whoever writes to it, and a device may act on it.
 #include "image/input_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include <filesystem>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 namespace ols {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-const char* kind_of(const fs::file_status& status) {
-    switch (status.type()) {
-        case fs::file_type::directory: return "a folder";
-        case fs::file_type::block:
-        case fs::file_type::character: return "a device";
-        case fs::file_type::fifo: return "a pipe";
-        default: return "no file";
+class Descriptor {
+  public:
+    explicit Descriptor(int number) : number_(number) {}
+    ~Descriptor() {
+        if (number_ >= 0) close(number_);
     }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    int number() const { return number_; }
+
+  private:
+    int number_;
+};
+
+const char* kind_of(mode_t mode) {
+    if (S_ISDIR(mode)) return "a folder";
+    if (S_ISFIFO(mode)) return "a pipe";
+    if (S_ISSOCK(mode)) return "a socket";
+    return "a device";
 }
 
 }  // namespace
 
 Result<std::ifstream> open_input(const std::string& path) {
-    std::error_code error;
-    const auto status = fs::status(path, error);
-    if (!fs::exists(status)) return fail("'" + path + "' is not there: check the path");
-    if (!fs::is_regular_file(status)) return fail("'" + path + "' is " + kind_of(status) + ": name a file");
+    struct stat state {};
+    if (stat(path.c_str(), &state) != 0)
+        return fail(fmt::format("'{}' is not there: check the path ({})", path, std::strerror(errno)));
+    if (!S_ISREG(state.st_mode)) return fail(fmt::format("'{}' is {}: name a file", path, kind_of(state.st_mode)));
     std::ifstream stream(path, std::ios::binary);
     if (!stream) return fail("cannot open '" + path + "': check that you may read it");
     return stream;
@@ -56,16 +69,32 @@ std::string kind_of_bytes(std::string_view bytes) {
     return "no file of a kind known here";
 }
 
-Result<std::string> read_input(const std::string& path, uint64_t most) {
-    auto stream = open_input(path);
-    if (!stream) return stream.error();
-    std::error_code error;
-    const uint64_t size = fs::file_size(path, error);
-    if (error || size > most)
-        return fail(fmt::format("'{}' has {} bytes, and no more than {} are read: check what it is", path, size, most));
-    std::string bytes(size, '\0');
-    stream->read(bytes.data(), std::streamsize(size));
-    if (uint64_t(stream->gcount()) != size) return fail("cannot read '" + path + "': check the disk");
+Result<std::string> read_input(const std::string& path, const std::string& what, uint64_t most_bytes) {
+    if (path.empty()) return fail(fmt::format("the path of the {} is empty: name a file", what));
+    const auto refused = [&](const std::string& why) {
+        return fail(fmt::format("cannot open {} '{}': {}", what, path, why));
+    };
+    if (path.find('\0') != path.npos) return refused("a path holds no zero byte");
+    struct stat state {};
+    // Devices may act on being opened.
+    if (stat(path.c_str(), &state) != 0) return refused(fmt::format("{}; check the path", std::strerror(errno)));
+    if (!S_ISREG(state.st_mode)) return refused(fmt::format("it is {}, not a file", kind_of(state.st_mode)));
+    const Descriptor file(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+    if (file.number() < 0 || fstat(file.number(), &state) != 0)
+        return refused(fmt::format("{}; check its permissions", std::strerror(errno)));
+    if (!S_ISREG(state.st_mode)) return refused(fmt::format("it is {}, not a file", kind_of(state.st_mode)));
+    if (uint64_t(state.st_size) > most_bytes)
+        return refused(fmt::format("it has {} bytes, and a {} has at most {}", state.st_size, what, most_bytes));
+    std::string bytes(size_t(state.st_size), '\0');
+    size_t done = 0;
+    while (done < bytes.size()) {
+        const ssize_t got = read(file.number(), bytes.data() + done, bytes.size() - done);
+        if (got < 0 && errno == EINTR) continue;
+        if (got < 0) return refused(std::strerror(errno));
+        if (got == 0) break;
+        done += size_t(got);
+    }
+    bytes.resize(done);
     return bytes;
 }
 

@@ -17,7 +17,9 @@ Result<std::ifstream> open_input(const std::string& path);
 // In words what kind of file begins with these bytes (16 are enough): "a PNG picture", "empty".
 std::string kind_of_bytes(std::string_view bytes);
 
-// All its bytes. An error also if they are more than `most`.
-Result<std::string> read_input(const std::string& path, uint64_t most);
+// The bytes of a file. `what` names it in errors ("mesh"). Links are followed. Errors say what to do: an empty path, a path that
+// leads nowhere, a folder, a device, a pipe or a socket (which are not waited for), more than `most_bytes` (said before memory
+// is taken), a file that cannot be read.
+Result<std::string> read_input(const std::string& path, const std::string& what, uint64_t most_bytes);
 
 }  // namespace ols

@@ -239,7 +239,7 @@ bool begins_as_radiance(std::string_view bytes) {
 
 Result<FloatPicture> read_radiance(const std::string& path) {
     try {
-        const auto bytes = read_input(path, most_file_bytes);
+        const auto bytes = read_input(path, "picture", most_file_bytes);
         if (!bytes) return bytes.error();
         if (!begins_as_radiance(*bytes))
             return fail("cannot read '" + path + "' as Radiance: it is " + kind_of_bytes(*bytes) +

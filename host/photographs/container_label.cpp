@@ -99,7 +99,7 @@ Result<ContainerLabel> read_heif_label(const std::string& path) {
 }
 
 Result<ContainerLabel> read_webp_label(const std::string& path) {
-    const auto bytes = read_input(path, largest_file);
+    const auto bytes = read_input(path, "picture", largest_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
     if (file.size() < 12 || uint64_t(little_word(file, 4)) + 8 > file.size()) return damaged(path, "it is cut short");

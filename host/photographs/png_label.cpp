@@ -79,7 +79,7 @@ Status take_chunk(std::string_view type, std::string_view data, ColorLabel& labe
 }  // namespace
 
 Result<ColorLabel> read_png_label(const std::string& path) {
-    const auto bytes = read_input(path, largest_file);
+    const auto bytes = read_input(path, "picture", largest_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
     const auto damaged = [&](const std::string& why) {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <sstream>
 
-#include "image/bounded_file.hpp"
+#include "image/input_file.hpp"
 #include "image/whole_file.hpp"
 #include "stage/basis_inverse.hpp"
 #include "wire.h"
@@ -60,7 +60,7 @@ bool has_empty_cell(const std::string& line) {
 
 // The text with \n at its lines' ends (old Mac files have \r alone) and without a byte order mark.
 Result<std::string> read_text(const std::string& path) {
-    auto text = read_bounded_file(path, "basis file", file_bytes_max);
+    auto text = read_input(path, "basis file", file_bytes_max);
     if (!text.ok()) return text;
     if (text->starts_with("\xff\xfe") || text->starts_with("\xfe\xff"))
         return fail(path + ": is UTF-16 text: save it as UTF-8 or as plain CSV");

@@ -12,7 +12,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "image/bounded_file.hpp"
+#include "image/input_file.hpp"
 #include "stage/toml_outline.hpp"
 
 // toml++ 3.3 asserts what some texts do not hold. Its asserts are thrown, in builds without asserts, too, and with exceptions
@@ -119,7 +119,7 @@ TomlSection::TomlSection(std::shared_ptr<File> file, const void* table, std::str
     : file_(std::move(file)), table_(table), prefix_(std::move(prefix)) {}
 
 Result<TomlSection> TomlSection::open(const std::string& path) {
-    const auto text = read_bounded_file(path, "configuration", file_bytes_max);
+    const auto text = read_input(path, "configuration", file_bytes_max);
     if (!text) return text.error();
     if (const Status bounded = check_toml_outline(path, *text); !bounded) return bounded.error();
     auto file = std::make_shared<File>();

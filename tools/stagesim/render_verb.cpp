@@ -9,8 +9,8 @@
 #include <numbers>
 #include <optional>
 
-#include "image/bounded_file.hpp"
 #include "image/exr.hpp"
+#include "image/input_file.hpp"
 #include "image/json_object.hpp"
 #include "image/outputs.hpp"
 #include "image/png.hpp"
@@ -52,7 +52,7 @@ std::optional<Float3> weight_of(const nlohmann::json& entry) {
 
 // `{"weights": [w, ...]}` or `{"weights": [[r, g, b], ...]}`, one for each lamp from 0; the rest is dark.
 Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) {
-    const auto text = read_bounded_file(path, "weights", weights_bytes_max);
+    const auto text = read_input(path, "weights", weights_bytes_max);
     if (!text) return text.error();
     const auto json = parse_json(*text, "'" + path + "'");
     if (!json) return json.error();
@@ -60,7 +60,8 @@ Result<std::vector<Float3>> read_weights(const std::string& path, size_t lamps) 
         fail(fmt::format("'{}' must hold {{\"weights\": [...]}} and nothing else, with at most {} numbers "
                          "or [r, g, b] from {} to {}",
                          path, lamps, -weight_max, weight_max));
-    if (!json->is_object() || json->size() != 1 || !json->contains("weights") || !(*json)["weights"].is_array()) return wrong;
+    if (!json->is_object() || json->size() != 1 || !json->contains("weights") || !(*json)["weights"].is_array())
+        return wrong;
     const nlohmann::json& entries = (*json)["weights"];
     if (entries.size() > lamps) return wrong;
     std::vector<Float3> weights(lamps);

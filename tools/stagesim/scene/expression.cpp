@@ -10,7 +10,7 @@
 #include <optional>
 #include <sstream>
 
-#include "image/bounded_file.hpp"
+#include "image/input_file.hpp"
 #include "scene/numbers.hpp"
 
 namespace ols {
@@ -30,7 +30,7 @@ std::vector<std::vector<uint32_t>> vertices_of_file(const Mesh& mesh) {
 }  // namespace
 
 Result<MeshTarget> read_target(const std::string& path, const Mesh& mesh, const MeshPlacement& placement) {
-    const auto bytes = read_bounded_file(path, "target", mesh_bytes_max);
+    const auto bytes = read_input(path, "target", mesh_bytes_max);
     if (!bytes) return fail(bytes.error().message + " (the head's come with `make assets`)");
     const Pose turned{placement.rotation, {}};
     const auto vertices = vertices_of_file(mesh);

@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "image/bounded_file.hpp"
+#include "image/input_file.hpp"
 #include "scene/polygon_mesh.hpp"
 
 namespace ols {
@@ -117,8 +117,8 @@ std::string fetch(const std::string& mesh_path, const std::string& uri) {
     const bool climbs = std::any_of(name.begin(), name.end(), [](const auto& part) { return part == ".."; });
     if (name.is_absolute() || climbs || uri.find(':') != uri.npos)
         wrong(fmt::format("its buffer '{:.60}' lies outside of its folder: put it beside", uri));
-    auto bytes = read_bounded_file((std::filesystem::path(mesh_path).parent_path() / name).string(), "buffer of a mesh",
-                                   mesh_bytes_max);
+    auto bytes = read_input((std::filesystem::path(mesh_path).parent_path() / name).string(), "buffer of a mesh",
+                            mesh_bytes_max);
     if (!bytes) wrong(bytes.error().message);
     return std::move(*bytes);
 }

@@ -8,7 +8,7 @@
 #include <cctype>
 #include <filesystem>
 
-#include "image/bounded_file.hpp"
+#include "image/input_file.hpp"
 
 namespace ols {
 
@@ -45,7 +45,7 @@ Status check_corners(PolygonMesh& mesh) {
 }
 
 Result<PolygonMesh> read_polygon_mesh(const std::string& path) {
-    auto bytes = read_bounded_file(path, "mesh", mesh_bytes_max);
+    auto bytes = read_input(path, "mesh", mesh_bytes_max);
     if (!bytes) return fail(bytes.error().message + " (the demo's head comes with `make assets`)");
     std::string ending = std::filesystem::path(path).extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
