@@ -20,6 +20,7 @@
 #include "image/exr_colour.hpp"
 #include "image/exr_sizes.hpp"
 #include "image/input_file.hpp"
+#include "image/orientation.hpp"
 #include "image/primaries.hpp"
 
 namespace ols {
@@ -140,22 +141,29 @@ void say_header(const Imf::Header& header, FloatPicture& picture) {
 }
 
 // OpenEXR itself has no such attribute; OpenImageIO writes Exif's, and leaves the pixels as they lie.
-Status check_upright(const Imf::Header& header) {
-    const auto* orientation = header.findTypedAttribute<Imf::IntAttribute>("Orientation");
-    if (!orientation || orientation->value() == 1) return Done{};
+Result<int> stated_orientation(const Imf::Header& header) {
+    const auto* attribute = header.findTypedAttribute<Imf::IntAttribute>("Orientation");
+    const int orientation = attribute ? attribute->value() : 1;
+    if (orientation >= 1 && orientation <= 8) return orientation;
     return fail(
-        fmt::format("its Orientation is {}, so its pixels lie turned or mirrored: `oiiotool IN --reorient -o OUT` sets "
-                    "them upright",
-                    orientation->value()));
+        fmt::format("it says its Orientation is {}: the attribute has 1 to 8; remove or correct it", orientation));
+}
+
+void turn(FloatPicture& picture) {
+    if (picture.orientation == 1) return;
+    picture.pixels = upright(std::move(picture.pixels), picture.orientation);
+    picture.said.push_back(fmt::format("turned or mirrored as it says (Orientation {})", picture.orientation));
 }
 
 Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& layer) {
-    if (const Status upright = check_upright(file.header(layer.part)); !upright) return upright.error();
+    const auto orientation = stated_orientation(file.header(layer.part));
+    if (!orientation) return orientation.error();
     if (!file.partComplete(layer.part))
         return fail("it is incomplete (rows or tiles are missing): copy or save it again");
     Imf::InputPart part(file, layer.part);
     const Imf::Header& header = part.header();
     FloatPicture picture;
+    picture.orientation = *orientation;
     if (!layer.left_out.empty()) picture.said.push_back("left out: " + layer.left_out);
     say_header(header, picture);
     say_windows(header.dataWindow(), header.displayWindow(), picture.said);
@@ -179,6 +187,7 @@ Result<FloatPicture> read_stream(std::ifstream& stream, const std::string& path,
     auto picture = read_part(file, *layer);
     if (picture && !layer->name.empty() && !choice.layer)
         picture->said.insert(picture->said.begin(), "its layer '" + layer->name + "' was taken");
+    if (picture && choice.turn) turn(*picture);
     return picture;
 }
 

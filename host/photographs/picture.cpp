@@ -9,9 +9,9 @@
 #include <limits>
 
 #include "image/exr.hpp"
+#include "image/orientation.hpp"
 #include "image/radiance.hpp"
 #include "image/tone.hpp"
-#include "photographs/orientation.hpp"
 
 namespace ols {
 
@@ -176,9 +176,10 @@ std::optional<Image> take_alpha(Image& image) {
 
 // OpenEXR and Radiance.
 Result<Picture> read_floats(const std::string& path, PictureFormat format, const PictureOptions& options) {
-    auto read = format == PictureFormat::openexr ? read_exr_picture(path) : read_radiance(path);
+    auto read = format == PictureFormat::openexr ? read_exr_picture(path, {.turn = false}) : read_radiance(path);
     if (!read) return read.error();
     Picture picture;
+    picture.orientation = read->orientation;
     picture.said = std::move(read->said);
     picture.alpha = take_alpha(read->pixels);
     if (picture.alpha)

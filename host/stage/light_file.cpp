@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <iterator>
 #include <optional>
 #include <string_view>
 
@@ -151,12 +150,9 @@ Status check_directions(const LightFile& file, const std::string& path) {
 }  // namespace
 
 Result<std::vector<TextLine>> read_text_lines(const std::string& path) {
-    auto stream = open_input(path);
-    if (!stream) return stream.error();
-    std::error_code error;
-    if (std::filesystem::file_size(path, error) > largest_text || error)
-        return fail("'" + path + "' is larger than 64 MB: no list of lights");
-    const auto text = decoded(std::string{std::istreambuf_iterator<char>(*stream), {}});
+    const auto bytes = read_input(path, "list of lights", largest_text);
+    if (!bytes) return bytes.error();
+    const auto text = decoded(*bytes);
     if (!text || text->find('\0') != std::string::npos) return fail("'" + path + "' is no text: save it as UTF-8");
     std::vector<TextLine> lines;
     int number = 1;

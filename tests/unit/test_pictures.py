@@ -11,6 +11,7 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms, ImageOps
 
+from exr_bytes import exr
 from picture_files import bmp, png, tga, write_dng
 from picture_folder import ALPHA8, CODES8, CODES16, GENERATOR, GREY8, GREY16, HEIGHT, SRGB8, SRGB16, WIDTH, folder, linear_of, near
 
@@ -76,6 +77,8 @@ def test_pictures_are_turned_as_exif_says_alike_in_every_format(folder, orientat
     tifffile.imwrite(folder.path / "a.tif", CODES8, photometric="rgb", extratags=tags, metadata=None)
     picture.save(folder.path / "b.png", exif=exif)
     picture.save(folder.path / "c.webp", lossless=True, exif=exif)
+    channels = {name: SRGB8[..., c].astype(np.float32) for c, name in enumerate("RGB")}
+    (folder.path / "d.exr").write_bytes(exr(channels, extra=[("Orientation", "int", struct.pack("<i", orientation))]))
     light = folder.light()
     for lamp in light:
         near(lamp, truth)

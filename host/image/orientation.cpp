@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One mapping for pictures and for the filters of mosaics.
-#include "photographs/orientation.hpp"
+#include "image/orientation.hpp"
 
 #include <algorithm>
 
