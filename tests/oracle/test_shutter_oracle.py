@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: MIT
 """rf relight --shutter against numpy, on archives whose motion was added by another program from what docs/archive.md says."""
 import json
+import pathlib
+import sys
 
 import numpy as np
 import OpenEXR
 from pictures import ingested, read_exr, refusal, run
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "unit"))
+from chained_journal import note_anew
 
 LAMPS = np.array([[0.0, 1, 0], [0, 0, 1]])
 LIGHT = ("--light", "0 1 0 1 1 1")
@@ -20,6 +25,7 @@ def add_motion(take, times_s, flows):
     header.update(timesSeconds=json.dumps(times_s))
     parts = [*file.parts, OpenEXR.Part(header, channels, "motion")]
     OpenEXR.File(parts).write(str(take / TARGET))
+    note_anew(take)
 
 
 def a_take(folder, height=20, width=60):

@@ -212,7 +212,8 @@ def test_numbers_of_the_command_line_have_ranges(tmp_path, option, value):
                                   '{"weights": [1], "unit": "W"}', '{"weights": ' + json.dumps([1] * 163) + "}", "[" * 100_000, "\xff"])
 def test_weights_that_cannot_be_are_refused(tmp_path, text):
     (tmp_path / "w.json").write_bytes(text.encode("latin-1"))
-    assert "w.json' must hold" in run("stagesim", "render", SCENE, "--weights", tmp_path / "w.json", "-o", tmp_path / "o.exr", code=1)
+    said = run("stagesim", "render", SCENE, "--weights", tmp_path / "w.json", "-o", tmp_path / "o.exr", code=1)
+    assert ("w.json' must hold" if text[:1] in ("[", "{") and len(text) < 10_000 else "w.json' is damaged") in said
     (tmp_path / "w.json").unlink()
     os.mkfifo(tmp_path / "w.json")
     assert "is a pipe" in run("stagesim", "render", SCENE, "--weights", tmp_path / "w.json", "-o", tmp_path / "o.exr", code=1)
