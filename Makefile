@@ -19,7 +19,7 @@ setup: ## install what is needed (apt, npm, pip); does nothing the second time
 firmware: setup ## build/firmware/BOARD/stage.elf and stage.uf2, of the default board in build/firmware, too
 	@$(MAKE) --no-print-directory -C firmware BOARD=
 
-host: setup ## build/host/bin/{stagectl,rf,stagesim}
+host: setup ## build/host/bin/{stagectl,rf,stagesim,stagectl-ingest}
 	@test -e $(HOST)/build.ninja || cmake -S . -B $(HOST) -G Ninja -DOLS_TESTS=OFF >/dev/null
 	@ninja -C $(HOST) --quiet
 

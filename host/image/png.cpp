@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-// PNG writing through OpenCV's encoder.
+// libpng's simplified interface. It labels what it writes as sRGB.
 #include "image/png.hpp"
 
-#include <cassert>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
+#include <png.h>
 
-#include "exceptions.hpp"
+#include <cassert>
+#include <string_view>
+#include <vector>
+
 #include "image/tone.hpp"
 #include "image/whole_file.hpp"
 
@@ -14,17 +15,16 @@ namespace ols {
 
 Status write_png(const std::string& path, int width, int height, std::span<const uint8_t> rgb8) {
     assert(rgb8.size() == size_t(width) * height * 3);
-    std::vector<uint8_t> encoded;
-    try {
-        // The encoder takes B G R and does not write to its input.
-        const cv::Mat rgb(height, width, CV_8UC3, const_cast<uint8_t*>(rgb8.data()));
-        cv::Mat bgr;
-        cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-        cv::imencode(".png", bgr, encoded);
-    } catch (const cv::Exception& e) {
-        return fail("cannot write '" + path + "': " + words_of(e));
-    }
-    return write_whole_file(path, std::string_view(reinterpret_cast<const char*>(encoded.data()), encoded.size()));
+    png_image image{};
+    image.version = PNG_IMAGE_VERSION;
+    image.width = png_uint_32(width);
+    image.height = png_uint_32(height);
+    image.format = PNG_FORMAT_RGB;
+    const auto cannot = [&] { return fail("cannot write '" + path + "': " + image.message); };
+    std::vector<uint8_t> encoded(PNG_IMAGE_PNG_SIZE_MAX(image));
+    png_alloc_size_t size = encoded.size();
+    if (!png_image_write_to_memory(&image, encoded.data(), &size, 0, rgb8.data(), 0, nullptr)) return cannot();
+    return write_whole_file(path, std::string_view(reinterpret_cast<const char*>(encoded.data()), size));
 }
 
 Status write_png_preview(const std::string& path, const Image& scene_linear) {

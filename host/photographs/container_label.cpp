@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
-// libheif for HEIF; WebP is a list of chunks.
+// WebP is a list of chunks; H.273 is a list of codes.
 #include "photographs/container_label.hpp"
 
 #include <fmt/format.h>
-#include <libheif/heif.h>
 
-#include <memory>
 #include <string_view>
 
 #include "image/input_file.hpp"
@@ -16,25 +14,8 @@ namespace {
 
 constexpr uint64_t largest_file = uint64_t(1) << 32;
 
-using Context = std::unique_ptr<heif_context, void (*)(heif_context*)>;
-
-struct HandleRelease {
-    void operator()(heif_image_handle* handle) const { heif_image_handle_release(handle); }
-};
-using Handle = std::unique_ptr<heif_image_handle, HandleRelease>;
-
 Error damaged(const std::string& path, const std::string& why) {
     return fail("'" + path + "' is damaged (" + why + "): copy it again");
-}
-
-Result<ColorLabel> label_of_nclx(heif_image_handle* handle, const std::string& path) {
-    heif_color_profile_nclx* codes = nullptr;
-    if (heif_image_handle_get_nclx_color_profile(handle, &codes).code != heif_error_Ok || !codes) return ColorLabel{};
-    const int primaries = codes->color_primaries, transfer = codes->transfer_characteristics;
-    heif_nclx_color_profile_free(codes);
-    auto label = label_of_codes(primaries, transfer, "its colour codes");
-    if (!label) return fail("'" + path + "' " + label.error().message + ": save it as sRGB or linear");
-    return label;
 }
 
 uint32_t little_word(std::string_view bytes, size_t at) {
@@ -73,37 +54,12 @@ Result<ColorLabel> label_of_codes(int primaries, int transfer, const std::string
     return label;
 }
 
-Result<ContainerLabel> read_heif_label(const std::string& path) {
-    const Context context(heif_context_alloc(), heif_context_free);
-    const auto read = heif_context_read_from_file(context.get(), path.c_str(), nullptr);
-    if (read.code != heif_error_Ok) return damaged(path, read.message);
-    heif_image_handle* primary = nullptr;
-    const auto found = heif_context_get_primary_image_handle(context.get(), &primary);
-    if (found.code != heif_error_Ok) return damaged(path, found.message);
-    const Handle handle(primary);
-    ContainerLabel result;
-    if (const int bits = heif_image_handle_get_luma_bits_per_pixel(primary); bits > 8)
-        result.said.push_back(fmt::format("its {} bits are read as 8", bits));
-    const auto type = heif_image_handle_get_color_profile_type(primary);
-    if (type == heif_color_profile_type_prof || type == heif_color_profile_type_rICC) {
-        result.label.profile.resize(heif_image_handle_get_raw_color_profile_size(primary));
-        result.label.name = "its profile";
-        const auto got = heif_image_handle_get_raw_color_profile(primary, result.label.profile.data());
-        if (got.code != heif_error_Ok) return damaged(path, got.message);
-    } else if (type == heif_color_profile_type_nclx) {
-        auto label = label_of_nclx(primary, path);
-        if (!label) return label.error();
-        result.label = std::move(*label);
-    }
-    return result;
-}
-
-Result<ContainerLabel> read_webp_label(const std::string& path) {
+Result<WebpLabel> read_webp_label(const std::string& path) {
     const auto bytes = read_input(path, "picture", largest_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
     if (file.size() < 12 || uint64_t(little_word(file, 4)) + 8 > file.size()) return damaged(path, "it is cut short");
-    ContainerLabel result;
+    WebpLabel result;
     for (size_t at = 12; at + 8 <= file.size();) {
         const size_t length = little_word(file, at + 4);
         if (length > file.size() - at - 8) return damaged(path, "it is cut short");

@@ -47,7 +47,7 @@ inline bool is_mosaic(Cfa cfa) {
     return cfa != Cfa::none && cfa != Cfa::rgb;
 }
 
-// Reads PNG, JPEG, TIFF, BMP, TGA, WebP, HEIC, AVIF and PNM through OpenImageIO, OpenEXR and Radiance (image/exr.hpp, image/radiance.hpp)
+// Reads PNG, JPEG, TIFF, BMP, TGA, WebP and PNM through OpenImageIO, HEIC and AVIF through libheif, OpenEXR and Radiance (image/exr.hpp, image/radiance.hpp)
 // and, if asked for, camera raw through LibRaw. Rows top to bottom, R G B. Where pixels lie: turned and mirrored as the file says, the
 // display window where there is one. Colours: profiles, gamma and primaries are converted to linear light of Rec. 709's primaries; with
 // another transfer than by_file they are left out, and this is said. Alpha does not change colours. docs/doors/pictures.md has all rules.

@@ -8,10 +8,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
+#include "photographs/heif.hpp"
+#include "photographs/stated_size.hpp"
 
 namespace ols {
 
@@ -37,19 +38,6 @@ Error unreadable(const std::string& path, const std::string& why) {
                 (why.empty() ? "" : " (" + one_line(why) + ")") + "; copy it again, or save it as PNG or TIFF");
 }
 
-Status check_size(const std::string& path, PictureFormat format, double width, double height, double bytes_a_pixel) {
-    std::error_code error;
-    const double file = double(std::filesystem::file_size(path, error));
-    const bool is_possible =
-        width >= 1 && height >= 1 && width <= 65535 && height <= 65535 && width * height <= 1 << 28;
-    const double bytes = width * height * bytes_a_pixel;
-    const bool is_likely = format == PictureFormat::heif ? bytes <= std::max(64e6, 2000 * file) : bytes <= 2000 * file;
-    if (is_possible && is_likely) return Done{};
-    return fail(fmt::format("'{}' says it is {:.0f} x {:.0f}: {}", path, width, height,
-                            is_possible ? fmt::format("{:.0f} bytes cannot hold that; it is damaged", file)
-                                        : "larger than any picture that is read (65535 a side, 268 million pixels)"));
-}
-
 Result<OpenPicture> open_picture(const std::string& path, PictureFormat format) {
     auto input = ImageInput::create(format_name(format));
     if (!input) return fail("this system's OpenImageIO does not read " + std::string(format_name(format)) + " files");
@@ -62,7 +50,7 @@ Result<OpenPicture> open_picture(const std::string& path, PictureFormat format) 
 
 // By an input of its own: some of OpenImageIO's do not come back from a page that is not there.
 int count_pages(const std::string& path, PictureFormat format) {
-    if (format != PictureFormat::heif && format != PictureFormat::webp) return 1;
+    if (format != PictureFormat::webp) return 1;
     const auto picture = open_picture(path, format);
     int pages = 1;
     while (picture.ok() && pages < 10000 && picture->input->seek_subimage(pages, 0)) ++pages;
@@ -71,11 +59,7 @@ int count_pages(const std::string& path, PictureFormat format) {
 
 // Moves to the page that is meant.
 Status choose_page(OpenPicture& picture, const std::string& path, int pages, int page) {
-    if (page == 0 && pages > 1)
-        return fail(fmt::format("'{}' has {} pages: choose one with --page 1 to {}", path, pages, pages));
-    if (page > pages)
-        return fail(
-            fmt::format("'{}' has {} {}: there is no page {}", path, pages, pages == 1 ? "page" : "pages", page));
+    if (auto s = check_page(path, pages, page); !s) return s;
     if (page > 1 && !picture.input->seek_subimage(page - 1, 0)) return unreadable(path, picture.input->geterror());
     picture.spec = picture.input->spec();
     return Done{};
@@ -94,11 +78,7 @@ Status sort_channels(const ImageSpec& spec, const std::string& path, PictureSamp
     if (spec.deep || spec.depth > 1 || spec.nchannels < 1 || others > 1 ||
         (others == 1 && samples.alpha >= 0 && samples.alpha != samples.colors))
         return fail(fmt::format("'{}' has {} channels: save it as grey or R G B", path, spec.nchannels));
-    if (others == 1)
-        samples.said.push_back(samples.alpha < 0 ? "a channel beside the colours is left out"
-                               : samples.is_multiplied
-                                   ? "alpha is left out; the colours are multiplied by it as the file has them"
-                                   : "alpha is left out");
+    say_other_channel(samples);
     return Done{};
 }
 
@@ -125,10 +105,14 @@ void take_label(const ImageSpec& spec, PictureSamples& samples) {
     }
 }
 
-void take_metadata(const ImageSpec& spec, PictureSamples& samples) {
+void take_exposure(const ImageSpec& spec, PictureSamples& samples) {
     samples.exposure = {attribute(spec, "ExposureTime"), attribute(spec, "FNumber"),
                         attribute(spec, "Exif:PhotographicSensitivity")};
     if (samples.exposure.iso == 0) samples.exposure.iso = attribute(spec, "Exif:ISOSpeedRatings");
+}
+
+void take_metadata(const ImageSpec& spec, PictureSamples& samples) {
+    take_exposure(spec, samples);
     take_label(spec, samples);
     const int x = spec.x - spec.full_x, y = spec.y - spec.full_y;
     if (x != 0 || y != 0) samples.said.push_back("its place on a page is left out");
@@ -205,7 +189,18 @@ Status check_photometric(const TiffPage& page, const std::string& path) {
     }
 }
 
+// HEIC and AVIF. Turning them is the container's and done: their Exif says nothing of it (ISO/IEC 23008-12, A.2.2).
+Result<PictureSamples> read_heif_file(const std::string& path, int page) {
+    auto heif = read_heif(path, page);
+    if (!heif) return heif.error();
+    ImageSpec spec;
+    if (!heif->exif.empty()) OIIO::decode_exif(OIIO::cspan<uint8_t>(heif->exif.data(), heif->exif.size()), spec);
+    take_exposure(spec, heif->samples);
+    return std::move(heif->samples);
+}
+
 Result<PictureSamples> read_checked(const std::string& path, PictureFormat format, int page) {
+    if (format == PictureFormat::heif) return read_heif_file(path, page);
     PictureSamples samples;
     std::vector<TiffPage> tiff_pages;
     if (format == PictureFormat::jpeg)
@@ -216,12 +211,11 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
         samples.label = std::move(*label);
     }
     std::vector<uint8_t> exif;
-    if (format == PictureFormat::heif || format == PictureFormat::webp) {
-        auto container = format == PictureFormat::heif ? read_heif_label(path) : read_webp_label(path);
-        if (!container) return container.error();
-        samples.label = std::move(container->label);
-        samples.said = std::move(container->said);
-        exif = std::move(container->exif);
+    if (format == PictureFormat::webp) {
+        auto webp = read_webp_label(path);
+        if (!webp) return webp.error();
+        samples.label = std::move(webp->label);
+        exif = std::move(webp->exif);
     }
     if (format == PictureFormat::tiff) {
         auto pages = read_tiff_pages(path);
@@ -234,8 +228,7 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
     if (auto s = choose_page(*picture, path, pages, page); !s) return s.error();
     ImageSpec& spec = picture->spec;
     if (!exif.empty()) OIIO::decode_exif(OIIO::cspan<uint8_t>(exif.data(), exif.size()), spec);
-    if (auto s = check_size(path, format, spec.width, spec.height, double(spec.pixel_bytes(true))); !s)
-        return s.error();
+    if (auto s = check_stated_size(path, spec.width, spec.height, double(spec.pixel_bytes(true))); !s) return s.error();
     const size_t index = size_t(std::max(page, 1) - 1);
     if (index < tiff_pages.size()) {
         if (auto s = check_photometric(tiff_pages[index], path); !s) return s.error();
@@ -260,6 +253,14 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
 }
 
 }  // namespace
+
+void say_other_channel(PictureSamples& samples) {
+    if (samples.channels == samples.colors) return;
+    samples.said.push_back(samples.alpha < 0 ? "a channel beside the colours is left out"
+                           : samples.is_multiplied
+                               ? "alpha is left out; the colours are multiplied by it as the file has them"
+                               : "alpha is left out");
+}
 
 Result<PictureSamples> read_samples(const std::string& path, PictureFormat format, int page) {
     try {

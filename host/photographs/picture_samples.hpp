@@ -34,10 +34,12 @@ struct PictureSamples {
     std::vector<std::string> said;
 };
 
+// Notes that alpha, or another channel beside the colours, is not used.
+void say_other_channel(PictureSamples& samples);
+
 // Reads page `page` (from 1; 0: the only one) of a file of a format but OpenEXR, Radiance and raw. Memory is taken once the stated
-// size was found possible: at most 65535 pixels a side, 2^28 pixels in all, and no more than 2000 times the file's bytes (nothing but
-// HEIC and AVIF packs tighter; these may state 64 million samples at any size). Errors name the file: damaged, several pages, CMYK or
-// Lab colours, channels that are no colours.
+// size was found possible (stated_size.hpp). Errors name the file: damaged, several pages, CMYK or Lab colours, channels that are no
+// colours.
 Result<PictureSamples> read_samples(const std::string& path, PictureFormat format, int page);
 
 }  // namespace ols

@@ -4,7 +4,6 @@
 // links: ols_photographs
 // smoke: 4000
 #include <OpenImageIO/imageio.h>
-#include <sanitizer/lsan_interface.h>
 #include <unistd.h>
 
 #include <array>
@@ -23,7 +22,6 @@ const std::string path = "/dev/shm/fuzz_picture." + std::to_string(getpid());
 
 std::string picture_file(const std::string& extension, const char* compression, OIIO::TypeDesc type) {
     const std::string name = path + extension;
-    const __lsan::ScopedDisabler x265_leaks;
     // OpenImageIO 2.4 writes HEIF as if all widths were multiples of 64.
     const bool is_heif = extension == ".heic" || extension == ".avif";
     OIIO::ImageSpec spec(is_heif ? 64 : 19, 13, 3, type);
@@ -91,6 +89,11 @@ const std::vector<std::string>& files() {
 }
 
 }  // namespace
+
+// libheif 1.15's decoders keep a damaged picture's memory, which its caller never gets to see; its encoder keeps some, too.
+extern "C" const char* __lsan_default_suppressions() {
+    return "leak:libdav1d\nleak:libde265\nleak:libheif\nleak:libx265\n";
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (size < 2) return 0;

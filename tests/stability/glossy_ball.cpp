@@ -2,7 +2,7 @@
 // A matte ball with a wet spot whose highlights saturate: naive inversion of clipped counts against masked samples, as figures and as a picture
 // (out/stability/glossy_ball.png: true, naive, unsolved left 0, smooth, non-negative; above one lamp of the highlights,
 // below one from the side, in which the naive inversion shows the highlights of other lamps).
-// links: ols_demultiplex
+// links: opencv_imgcodecs ols_demultiplex
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

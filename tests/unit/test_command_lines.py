@@ -3,6 +3,7 @@
 import json
 import pathlib
 import re
+import shutil
 import subprocess
 
 import numpy as np
@@ -131,3 +132,9 @@ def test_with_standard_output_closed_nothing_is_printed_into_a_file(files, tmp_p
     done = subprocess.run(["sh", "-c", shell, "sh", *map(str, command)], stderr=subprocess.PIPE, text=True)
     assert done.returncode == 1 and "did not all arrive" in done.stderr
     assert set(OpenEXR.File(str(tmp_path / "relit.exr"), separate_channels=True).channels()) == set("RGBA")
+
+
+def test_ingest_without_the_program_beside_it_says_what_is_missing(tmp_path):
+    alone = shutil.copy(BIN / "stagectl", tmp_path / "stagectl")
+    done = subprocess.run([alone, "ingest", "photos", "--lights", "a.lp", "-o", "take.rfa"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1 and "stagectl-ingest' (No such file or directory): install it beside stagectl" in done.stderr

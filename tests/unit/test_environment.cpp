@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Reading environment maps, and the solid angles of their texels.
-// links: ols_relight
+// links: opencv_imgcodecs ols_relight
 #include <ImfChannelList.h>
 #include <ImfEnvmap.h>
 #include <ImfFrameBuffer.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Ingest: pictures written by OpenCV come back as linear light by the closed form of sRGB; everything a real folder gets
 // wrong is named, and nothing is left behind.
-// links: ols_photographs
+// links: opencv_imgcodecs ols_photographs
 #include "photographs/ingest.hpp"
 
 #include <gtest/gtest.h>

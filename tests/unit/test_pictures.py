@@ -134,6 +134,30 @@ def test_lossy_formats_give_what_another_decoder_sees(folder, name):
     near(folder.light()[0], linear_of(seen / 255), 0.03)  # decoders interpolate chroma in their own ways
 
 
+@pytest.mark.parametrize("name", ["a.heic", "a.avif"])
+def test_heif_pictures_of_ten_bits_keep_them(folder, name):
+    """The decoder of pillow-heif is libheif, too, in another build: equal to a code of ten bits, where eight would be four apart."""
+    y, x = np.mgrid[0:64, 0:96]
+    codes = np.dstack([300 * 64 + 40 * y, 500 * 64 + 30 * x, 400 * 64 + 20 * (x + y)]).astype(np.uint16)
+    pillow_heif.encode("RGB;16", (96, 64), codes.tobytes(), folder.path / name, quality=-1, chroma="444", matrix_coefficients=0)
+    file = pillow_heif.open_heif(folder.path / name, convert_hdr_to_8bit=False)
+    assert file.info["bit_depth"] == 10
+    seen = np.asarray(file).astype(float)
+    light = folder.light("--transfer", "linear")[0]
+    assert len(np.unique(light[..., 0])) > 33  # 64 rows of 40 / 64 codes of ten bits
+    near(light, (seen / 64 + 0.5).astype(int) / 1023 if seen.max() > 1023 else seen / 1023, 1.6 / 1023)
+
+
+def test_a_heif_file_that_holds_less_than_it_says_is_damaged(folder):
+    """`ispe` (ISO/IEC 14496-12, 6.5.3) says one row more than was coded: OpenImageIO 2.4 reads beyond its memory there."""
+    pillow_heif.from_bytes("RGB", (64, 64), bytes(64 * 64 * 3)).save(folder.path / "a.heic")
+    file = (folder.path / "a.heic").read_bytes()
+    at = file.index(b"ispe") + 8
+    assert struct.unpack_from(">II", file, at) == (64, 64)
+    (folder.path / "a.heic").write_bytes(file[:at] + struct.pack(">II", 64, 640) + file[at + 8:])
+    assert "is damaged" in folder.refusal()
+
+
 def test_jpeg_files_with_fill_bytes_before_markers_are_read(folder):
     Image.fromarray(np.full((16, 16, 3), 90, np.uint8)).save(folder.path / "a.jpg", quality=95)
     file = (folder.path / "a.jpg").read_bytes()

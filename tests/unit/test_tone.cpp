@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The preview's tone curve, the sRGB transfer and the PNG files they end in.
-// links: ols_image
+// links: opencv_imgcodecs ols_image
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 

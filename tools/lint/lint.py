@@ -30,7 +30,8 @@ UPSTREAM = {
     "develop": {"image", "stage", "flow", "demultiplex"},
     "take": {"image", "stage", "device", "record", "develop", "archive"},
     "relight": {"image", "stage"},
-    "stagectl": {"image", "stage", "archive", "photographs", "device", "record", "develop", "take"},
+    "ingest": {"image", "photographs"},
+    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take"},
 }
 # Which rooms of host/ a program of tools/ may include.
 TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "archive", "relight"}, "stagesim": {"image", "stage", "flow", "relight"}}
