@@ -19,6 +19,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 
 #include "archive/exr_stream.hpp"
 #include "archive/manifest.hpp"
@@ -27,6 +28,7 @@
 #include "archive/target_layout.hpp"
 #include "exceptions.hpp"
 #include "image/demosaic.hpp"
+#include "image/half_samples.hpp"
 #include "image/json_object.hpp"
 
 namespace ols {
@@ -107,13 +109,24 @@ Imf::Header plane_header(const TakeInfo& info, const Target& head, const char* n
     return header;
 }
 
-// The value as stored, and whether it had to be changed for that.
 template <typename Stored>
-Stored storable(float value, bool& clamped) {
-    const float largest = sizeof(Stored) == sizeof(float) ? std::numeric_limits<float>::max() : float(HALF_MAX);
-    clamped = !(std::abs(value) <= largest);
-    if (std::isnan(value)) return Stored(0.0f);
-    return Stored(std::clamp(value, -largest, largest));
+constexpr float largest_of = sizeof(Stored) == sizeof(float) ? std::numeric_limits<float>::max() : float(HALF_MAX);
+
+// Brings samples of a box that cannot be stored to the nearest that can, a NaN to 0, and marks their pixels.
+void clamp_samples(std::span<float> samples, float largest, const Box& box, int width, std::vector<uint32_t>& mask) {
+    for (size_t i = 0; i < samples.size(); ++i) {
+        float& value = samples[i];
+        if (std::abs(value) <= largest) continue;
+        value = std::isnan(value) ? 0 : std::clamp(value, -largest, largest);
+        mask[(size_t(box.y) + i / box.width) * width + box.x + i % box.width] |= mask_clamped;
+    }
+}
+
+void store(std::span<const float> samples, half* stored) {
+    to_halves(samples, stored);
+}
+void store(std::span<const float> samples, float* stored) {
+    std::ranges::copy(samples, stored);
 }
 
 // Writes all lamp planes block by block and marks clamped samples in `mask`.
@@ -131,11 +144,10 @@ Status write_lamps(Imf::TiledOutputPart part, const Target& head, const std::vec
             for (size_t c = 0; c < channels.size(); ++c) {
                 if (const auto got = source(int(c), box, plane.data()); !got) return got.error();
                 Stored* stored = block.data() + c * plane.size();
-                for (int i = 0; i < box.width * box.height; ++i) {
-                    bool clamped;
-                    stored[i] = storable<Stored>(plane[i], clamped);
-                    if (clamped) mask[size_t(y + i / box.width) * head.width + x + i % box.width] |= mask_clamped;
-                }
+                const std::span<float> samples(plane.data(), size_t(box.width) * box.height);
+                if (!all_within(samples, largest_of<Stored>))
+                    clamp_samples(samples, largest_of<Stored>, box, head.width, mask);
+                store(samples, stored);
                 buffer.insert(channels[c], slice_at(sizeof(Stored) == 2 ? Imf::HALF : Imf::FLOAT, stored, box));
             }
             part.setFrameBuffer(buffer);
