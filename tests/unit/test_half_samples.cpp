@@ -38,8 +38,7 @@ TEST(HalfSamples, within_is_false_for_one_sample_beyond_wherever_it_stands) {
     std::vector<float> values(37, -65504.0f);
     EXPECT_TRUE(all_within(values, 65504));
     EXPECT_TRUE(all_within({}, 65504));
-    for (const float beyond :
-         {65505.0f, -65505.0f, HUGE_VALF, -HUGE_VALF, std::numeric_limits<float>::quiet_NaN()})
+    for (const float beyond : {65505.0f, -65505.0f, HUGE_VALF, -HUGE_VALF, std::numeric_limits<float>::quiet_NaN()})
         for (size_t i = 0; i < values.size(); ++i) {
             auto changed = values;
             changed[i] = beyond;
