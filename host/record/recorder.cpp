@@ -14,6 +14,7 @@
 #include "exceptions.hpp"
 #include "record/board_log.hpp"
 #include "record/event_queue.hpp"
+#include "record/frame_bits.hpp"
 
 namespace ols {
 
@@ -43,6 +44,7 @@ IdentifyOptions options_for(const Sequence& sequence, uint64_t camera_ns_at_star
 struct FrameNews {
     std::shared_ptr<Frame> frame;
     FrameWitness witness;
+    FrameBits bits;  // of a whole frame
 };
 struct CameraPause {
     uint64_t watermark_ns;  // everything before it has been read
@@ -73,6 +75,7 @@ class CameraReader {
         : camera_(camera),
           config_(config),
           black_counts_(black_counts),
+          bits_(config),
           room_(std::make_shared<Room>(ptrdiff_t(frames_max))),
           queue_(queue) {
         thread_ = std::thread([this] {
@@ -111,8 +114,10 @@ class CameraReader {
         news.witness.arrival = arrivals_++;
         news.witness.stamp = frame.stamp;
         news.witness.whole = is_whole(frame, config_);
-        if (news.witness.whole)
+        if (news.witness.whole) {
             news.witness.summary = summarize_frame(frame, black_counts_.value_or(frame.black), config_.noise);
+            news.bits = bits_.read(frame);
+        }
         news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = room_](Frame* last) {
             delete last;
             room->release();
@@ -123,6 +128,7 @@ class CameraReader {
     Camera& camera_;
     const CameraConfig& config_;
     const std::optional<double> black_counts_;
+    const BitsReader bits_;
     const std::shared_ptr<Room> room_;  // frames may outlive the reader
     EventQueue<Event>& queue_;
     std::atomic<uint64_t> arrivals_ = 0;
@@ -163,10 +169,25 @@ class Recording {
         ++report_.frames;
         if (!news.witness.whole && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
         silent_looks_ = 0;
+        look_at_bits(news);
         const uint64_t timestamp_ns = news.witness.stamp.timestamp_ns;
         frames_[news.witness.arrival] = std::move(news.frame);
         identifier_.add_frame(std::move(news.witness));
         if (log_ended_) finish_if_beyond(timestamp_ns);
+    }
+    // A duplicate has the same stamp, too, and is the reorder window's to find. Of two frames with the same bits the one that came
+    // first is taken to be itself.
+    void look_at_bits(const FrameNews& news) {
+        report_.frames_without_noise += news.witness.whole && !news.bits.tells;
+        const CameraStamp& stamp = news.witness.stamp;
+        const auto first = bits_seen_.add(news.bits, {news.witness.arrival, stamp});
+        if (!first || (first->stamp.frame_id == stamp.frame_id && first->stamp.timestamp_ns == stamp.timestamp_ns))
+            return;
+        ++report_.stale_buffers;
+        stale_[news.witness.arrival] = fmt::format(
+            "stale: the camera's frame {} has, bit for bit, the samples of its frame {}, {} frames before: an old "
+            "buffer was handed out again",
+            stamp.frame_id, first->stamp.frame_id, news.witness.arrival - first->arrival);
     }
     void take(LogNews news) {
         fired_ = std::max(fired_, news.next_counter);
@@ -226,8 +247,12 @@ class Recording {
             const auto found = frames_.find(verdict.arrival);
             const std::shared_ptr<Frame> frame = std::move(found->second);
             frames_.erase(found);
-            if (verdict.kind == Verdict::discarded) {
-                ++report_.frames_discarded;
+            const auto stale = stale_.extract(verdict.arrival);
+            if (verdict.kind == Verdict::discarded || stale) ++report_.frames_discarded;
+            if (verdict.kind == Verdict::discarded) continue;
+            if (stale) {
+                ++report_.slots_missing;
+                sink_.missing({verdict.entry.counter, stale.mapped(), true, true, Sight::silent});
                 continue;
             }
             frame->identified = true;
@@ -245,6 +270,8 @@ class Recording {
     const std::atomic<bool>& stop_;
     Identifier identifier_;
     std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
+    BitsSeen bits_seen_;
+    std::unordered_map<uint64_t, std::string> stale_;  // by arrival, until their verdict: why
     RecordReport report_;
     uint64_t fired_ = 0, last_watermark_ns_ = 0, log_end_watermark_ns_ = 0;
     int silent_looks_ = 0;

@@ -29,8 +29,10 @@ struct RecordSink {
 struct RecordReport {
     uint64_t frames = 0, frames_discarded = 0, duplicates = 0, camera_restarts = 0;
     uint64_t slots_total = 0, slots_missing = 0;
-    CameraInfo camera;           // as it was set up
-    CameraCounts camera_counts;  // of this take
+    uint64_t stale_buffers = 0;         // frames with the samples of an earlier one, bit for bit
+    uint64_t frames_without_noise = 0;  // frames of which that cannot be told (frame_bits.hpp)
+    CameraInfo camera;                  // as it was set up
+    CameraCounts camera_counts;         // of this take
     double clock_drift_ppm = 0;
     std::string unfit_frame;  // the first frame that was not of the stage's size or format; empty when there was none
     std::string board_end;    // why the board's log ended before the sequence did; empty when it did not

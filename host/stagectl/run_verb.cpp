@@ -89,6 +89,8 @@ nlohmann::json to_json(const TakeReport& report, const std::vector<Planned>& pla
                  {"frames_discarded", record.frames_discarded},
                  {"camera", camera_record(record.camera, record.camera_counts)},
                  {"duplicates", record.duplicates},
+                 {"stale_buffers", record.stale_buffers},
+                 {"frames_without_noise", record.frames_without_noise},
                  {"camera_restarts", record.camera_restarts},
                  {"clock_drift_ppm", record.clock_drift_ppm},
                  {"board_end", record.board_end},
@@ -126,6 +128,11 @@ void print_report(const TakeReport& report, bool is_estimate, const std::vector<
                    report.seconds_total);
     if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
     if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
+    if (record.stale_buffers > 0)
+        fmt::print(stderr,
+                   "stagectl: {} frames had the samples of an earlier one, bit for bit; their slots are missing: the "
+                   "camera's driver or grabber hands out old buffers\n",
+                   record.stale_buffers);
     if (!record.unfit_frame.empty())
         fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
                    record.unfit_frame);

@@ -102,6 +102,8 @@ nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& tar
                              {"frames", record.frames},
                              {"frames_discarded", record.frames_discarded},
                              {"duplicates", record.duplicates},
+                             {"stale_buffers", record.stale_buffers},
+                             {"frames_without_noise", record.frames_without_noise},
                              {"camera_restarts", record.camera_restarts},
                              {"clock_drift_ppm", record.clock_drift_ppm},
                              {"board_end", record.board_end},

@@ -127,6 +127,18 @@ def test_a_frozen_picture_in_a_lit_landmark_takes_down_its_stretch_and_nothing_e
     expect_same(archive, clean, 2)
 
 
+def test_an_old_buffer_in_a_basis_slot_is_known_by_its_bits_and_costs_that_slot(tmp_path, clean):
+    """No optical code knows a basis slot, and the stamps are right: it is the camera's noise that never comes twice."""
+    struck = [STRUCK["basis"], STRUCK["basis"] + 20]
+    archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": trigger} for trigger in struck], code=2)
+    assert missing_triggers(archive) == set(struck) and report["stale_buffers"] == 2
+    assert all("stale: the camera's frame" in slot["why"] and "1 frames before" in slot["why"] for slot in identification(archive)["missing"])
+    assert identification(archive)["stale_buffers"] == 2 and report["frames_without_noise"] == 0
+    expect_same(archive, clean, 0)
+    expect_same(archive, clean, 1, [slots_of("single")[trigger - CYCLE]["row"] for trigger in struck])
+    expect_same(archive, clean, 2)
+
+
 def basis_slot(basis, nth=50):
     """A basis slot of the second cycle."""
     return CYCLE + next(i for i, slot in enumerate(slots_of(basis)) if slot["kind"] == "basis" and i > nth)

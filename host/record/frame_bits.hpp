@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// What a frame's samples are bit for bit: a buffer that is handed out again under a new stamp is known by it, noise and all.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <unordered_map>
+
+#include "image/frame.hpp"
+#include "stage/stage.hpp"
+
+namespace ols {
+
+struct FrameBits {
+    uint64_t hash = 0;
+    // Whether two exposures to the same light cannot have these bits, because enough of the samples are neither 0 nor saturated and noise
+    // moves them. Nothing is known of a frame that is black or saturated throughout, or of a camera without noise.
+    bool tells = false;
+};
+
+// Reads frames of one camera. Thread-safe.
+class BitsReader {
+  public:
+    // Of the camera its saturation and its read noise, the least that moves a sample, are used.
+    explicit BitsReader(const CameraConfig& camera);
+
+    // Of a frame whose samples are complete. Samples of floats have no noise that is known here: they never tell.
+    FrameBits read(const Frame& frame) const;
+
+  private:
+    uint16_t saturated_;
+    double samples_needed_;  // that noise can move, until equal bits cannot be chance
+};
+
+// The chance that two samples of one light are equal: of whole counts with Gaussian noise of `sigma_counts`, whose mean is a whole count.
+double equal_chance(double sigma_counts);
+
+// Remembers the last frames by their bits.
+class BitsSeen {
+  public:
+    static constexpr size_t frames_max = 1 << 16;  // half a minute at 2160 a second
+
+    struct Seen {
+        uint64_t arrival;
+        CameraStamp stamp;
+    };
+    // The first of the frames remembered that had the same bits, if these tell; otherwise the frame is remembered.
+    std::optional<Seen> add(const FrameBits& bits, const Seen& frame);
+
+  private:
+    std::unordered_map<uint64_t, Seen> frames_;  // by hash
+    std::deque<uint64_t> order_;
+};
+
+}  // namespace ols
