@@ -56,7 +56,7 @@ class SocketTransfer : public Transfer {
 
     Status write(std::span<const uint8_t> bytes, uint32_t timeout_us, const Deadline& deadline) override {
         if (const Status sent = request(endpoint_out, bytes.size(), timeout_us, deadline); !sent.ok()) return sent;
-        if (const Status sent = socket_.send(bytes.data(), bytes.size(), deadline); !sent.ok()) return sent;
+        if (const Status sent = send(bytes.data(), bytes.size(), deadline); !sent.ok()) return sent;
         const auto reply = receive_reply(0, deadline);
         if (!reply.ok()) return reply.error();
         return Done{};
@@ -84,7 +84,13 @@ class SocketTransfer : public Transfer {
         request.length = uint32_t(length);
         request.timeout_us = timeout_us;
         largest_ = std::max(largest_, length);
-        return socket_.send(&request, sizeof request, deadline);
+        return send(&request, sizeof request, deadline);
+    }
+
+    // A board that has gone may have said why before, which is then still to be received: that it is busy.
+    Status send(const void* bytes, size_t count, const Deadline& deadline) {
+        const Status sent = socket_.send(bytes, count, deadline);
+        return !sent.ok() && socket_.has_bytes() ? Done{} : sent;
     }
 
     // The payload of the reply to the last request; replies to transfers given up earlier are passed over.

@@ -77,6 +77,11 @@ Status UnixSocket::send(const void* bytes, size_t count, const Deadline& deadlin
     return Done{};
 }
 
+bool UnixSocket::has_bytes() const {
+    uint8_t byte;
+    return ::recv(fd_, &byte, 1, MSG_PEEK | MSG_DONTWAIT) > 0;
+}
+
 Error UnixSocket::too_slow(const Deadline& deadline) const {
     return fail(fmt::format(
         "{} has not finished an exchange {}: is it stopped, or does something hold it back? Otherwise start "

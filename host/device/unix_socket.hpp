@@ -19,6 +19,9 @@ class UnixSocket {
     Status send(const void* bytes, size_t count, const Deadline& deadline);
     Status receive(void* bytes, size_t count, const Deadline& deadline);
 
+    // Whether bytes wait to be received, also from another end that has gone.
+    bool has_bytes() const;
+
     const std::string& name() const { return name_; }  // "the board at 'PATH'"
 
     UnixSocket(UnixSocket&& other) noexcept;

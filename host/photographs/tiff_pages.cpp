@@ -166,6 +166,11 @@ Status check_tiff_page(const std::string& path, int page) {
     const File file = open_tiff(path, complaints);
     if (!file || !TIFFSetDirectory(file.get(), uint16_t(page))) return damaged(path, complaints);
     complaints = {};  // of unknown tags: those do no harm
+    uint16_t compression = COMPRESSION_NONE;
+    TIFFGetFieldDefaulted(file.get(), TIFFTAG_COMPRESSION, &compression);
+    if (!TIFFIsCODECConfigured(compression))
+        return fail(fmt::format("'{}' has a compression that libtiff does not read here ({}): save it with another",
+                                path, compression));
     const bool tiled = TIFFIsTiled(file.get());
     const tmsize_t size = tiled ? TIFFTileSize(file.get()) : TIFFStripSize(file.get());
     const uint32_t blocks = tiled ? TIFFNumberOfTiles(file.get()) : TIFFNumberOfStrips(file.get());
@@ -176,8 +181,6 @@ Status check_tiff_page(const std::string& path, int page) {
                                 : TIFFReadEncodedStrip(file.get(), i, block.data(), size);
         if (read < 0 || complaints.count > 0) return damaged(path, complaints);
     }
-    uint16_t compression = 1;
-    TIFFGetFieldDefaulted(file.get(), TIFFTAG_COMPRESSION, &compression);
     const bool is_deflated = compression == COMPRESSION_ADOBE_DEFLATE || compression == COMPRESSION_DEFLATE;
     return is_deflated ? check_deflate(file.get(), blocks, path) : Done{};
 }

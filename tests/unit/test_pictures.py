@@ -41,6 +41,11 @@ def test_every_kind_of_tiff_file_is_read_as_it_was_written(folder, kind):
     near(folder.light()[0], truth)
 
 
+def test_a_compression_that_is_not_read_is_named(folder):
+    tifffile.imwrite(folder.path / "a.tif", CODES8, photometric="rgb", compression="jpeg2000", metadata=None)
+    assert "has a compression that libtiff does not read here (34712): save it with another" in folder.refusal()
+
+
 def test_signed_integers_keep_their_sign(folder):
     codes = (CODES16.astype(int) - 32768).astype(np.int16)
     tifffile.imwrite(folder.path / "a.tif", codes, photometric="rgb", metadata=None)

@@ -116,8 +116,8 @@ TEST_F(OtherEnd, a_board_that_turns_a_client_away_is_busy_and_not_gone) {
         EXPECT_EQ(write(client, &busy, sizeof busy), ssize_t(sizeof busy));
         close(client);
     });
+    board.join();  // it is gone when it is asked
     const std::string error = error_of((*transfer)->read(64, 1000, within(long_ms)));
-    board.join();
     EXPECT_NE(error.find("busy"), std::string::npos) << error;
     EXPECT_EQ(error.find("gone"), std::string::npos) << error;
 }
