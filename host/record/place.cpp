@@ -137,7 +137,7 @@ void FramePlacer::try_lock() {
     std::vector<OpticalCode::Seen> seen;
     uint64_t end = trigger_count_ - last_position_;  // above the last possible counter of position 0
     for (const Pending& pending : unlocked_) {
-        if (pending.frame.whole) seen.push_back({pending.position, &pending.frame.summary});
+        if (pending.frame.unfit.empty()) seen.push_back({pending.position, &pending.frame.summary});
         if (pending.frame.fired_before < UINT64_MAX)
             end = std::min(end, pending.frame.fired_before - std::min(pending.frame.fired_before, pending.position));
         const uint64_t limit = triggers_until(pending.frame.stamp.timestamp_ns);
@@ -153,7 +153,7 @@ void FramePlacer::try_lock() {
     // slots can be taken for.
     const auto learn = [&](bool basis, const Pending& pending) {
         const uint64_t counter = counter_of(pending);
-        if (pending.frame.whole && (code_.kind_at(counter) == SlotKind::basis) == basis)
+        if (pending.frame.unfit.empty() && (code_.kind_at(counter) == SlotKind::basis) == basis)
             code_.learn(counter, pending.frame.summary);
     };
     for (auto pending = unlocked_.rbegin(); pending != unlocked_.rend(); ++pending) learn(false, *pending);
@@ -175,7 +175,7 @@ void FramePlacer::examine(Pending pending) {
     for (; next_counter_ < counter; ++next_counter_) placements_.push_back({{}, next_counter_, false, pending.gap});
     next_counter_ = counter + 1;
     const FrameWitness& frame = pending.frame;
-    const Sight sight = frame.whole ? code_.look(counter, frame.summary) : Sight::silent;
+    const Sight sight = frame.unfit.empty() ? code_.look(counter, frame.summary) : Sight::silent;
     pending.optical = sight;
     if (sight >= Sight::agrees) code_.learn(counter, frame.summary);
     waiting_.push_back(std::move(pending));
@@ -210,11 +210,10 @@ void FramePlacer::end_stretch() {
 
 void FramePlacer::accept_waiting() {
     for (const Pending& pending : waiting_) {
-        if (pending.frame.whole && code_.kind_at(counter_of(pending)) == SlotKind::basis)
-            code_.learn(counter_of(pending), pending.frame.summary);
-        Placement placement{pending.frame.arrival, counter_of(pending), pending.frame.whole, "", pending.optical};
-        if (!pending.frame.whole) placement.why = "its size or format is not the stage's";
-        placements_.push_back(std::move(placement));
+        const FrameWitness& frame = pending.frame;
+        if (frame.unfit.empty() && code_.kind_at(counter_of(pending)) == SlotKind::basis)
+            code_.learn(counter_of(pending), frame.summary);
+        placements_.push_back({frame.arrival, counter_of(pending), frame.unfit.empty(), frame.unfit, pending.optical});
     }
     waiting_.clear();
 }

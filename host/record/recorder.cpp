@@ -113,8 +113,9 @@ class CameraReader {
         FrameNews news;
         news.witness.arrival = arrivals_++;
         news.witness.stamp = frame.stamp;
-        news.witness.whole = is_whole(frame, config_);
-        if (news.witness.whole) {
+        if (!is_whole(frame, config_)) {
+            news.witness.unfit = "its size or format is not the stage's";
+        } else {
             news.witness.summary = summarize_frame(frame, black_counts_.value_or(frame.black), config_.noise);
             news.bits = bits_.read(frame);
         }
@@ -167,7 +168,7 @@ class Recording {
 
     void take(FrameNews news) {
         ++report_.frames;
-        if (!news.witness.whole && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
+        if (!news.witness.unfit.empty() && report_.unfit_frame.empty()) report_.unfit_frame = describe(*news.frame);
         silent_looks_ = 0;
         look_at_bits(news);
         const uint64_t timestamp_ns = news.witness.stamp.timestamp_ns;
@@ -177,14 +178,14 @@ class Recording {
     }
     // A duplicate has the same stamp, too, and is the reorder window's to find. Of two frames with the same bits the one that came
     // first is taken to be itself.
-    void look_at_bits(const FrameNews& news) {
-        report_.frames_without_noise += news.witness.whole && !news.bits.tells;
+    void look_at_bits(FrameNews& news) {
+        report_.frames_without_noise += news.witness.unfit.empty() && !news.bits.tells;
         const CameraStamp& stamp = news.witness.stamp;
         const auto first = bits_seen_.add(news.bits, {news.witness.arrival, stamp});
         if (!first || (first->stamp.frame_id == stamp.frame_id && first->stamp.timestamp_ns == stamp.timestamp_ns))
             return;
         ++report_.stale_buffers;
-        stale_[news.witness.arrival] = fmt::format(
+        news.witness.unfit = fmt::format(
             "stale: the camera's frame {} has, bit for bit, the samples of its frame {}, {} frames before: an old "
             "buffer was handed out again",
             stamp.frame_id, first->stamp.frame_id, news.witness.arrival - first->arrival);
@@ -247,12 +248,8 @@ class Recording {
             const auto found = frames_.find(verdict.arrival);
             const std::shared_ptr<Frame> frame = std::move(found->second);
             frames_.erase(found);
-            const auto stale = stale_.extract(verdict.arrival);
-            if (verdict.kind == Verdict::discarded || stale) ++report_.frames_discarded;
-            if (verdict.kind == Verdict::discarded) continue;
-            if (stale) {
-                ++report_.slots_missing;
-                sink_.missing({verdict.entry.counter, stale.mapped(), true, true, Sight::silent});
+            if (verdict.kind == Verdict::discarded) {
+                ++report_.frames_discarded;
                 continue;
             }
             frame->identified = true;
@@ -271,7 +268,6 @@ class Recording {
     Identifier identifier_;
     std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
     BitsSeen bits_seen_;
-    std::unordered_map<uint64_t, std::string> stale_;  // by arrival, until their verdict: why
     RecordReport report_;
     uint64_t fired_ = 0, last_watermark_ns_ = 0, log_end_watermark_ns_ = 0;
     int silent_looks_ = 0;

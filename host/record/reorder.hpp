@@ -6,6 +6,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <string>
 
 #include "record/frame_summary.hpp"
 
@@ -15,7 +16,7 @@ namespace ols {
 struct FrameWitness {
     uint64_t arrival = 0;  // frames that arrived before it; the caller's name for it
     CameraStamp stamp;
-    bool whole = true;  // has the size and format that the stage configures
+    std::string unfit;  // why its picture cannot be used, whatever its stamp says; empty: it can
     FrameSummary summary;
     uint64_t fired_before = UINT64_MAX;  // its trigger's counter is below this: what the board had fired by then
 

@@ -10,6 +10,7 @@ import pytest
 
 from virtual_take import (
     BIN,
+    SMALL_STAGE,
     VirtualStage,
     identification,
     manifest,
@@ -33,7 +34,7 @@ def find_slot(kind, nth):
 STRUCK = {kind: find_slot(kind, nth) for kind, nth in {"tracking": 2, "matte": 4, "dark": 2, "basis": 120}.items()}
 
 
-def record(folder, faults, *stage_options, basis="single", cycles=CYCLES, code=0, run_options=()):
+def record(folder, faults, *stage_options, basis="single", cycles=CYCLES, code=0, run_options=(), stage=SMALL_STAGE):
     text = "".join(
         "[[fault]]\n" + "".join(f"{key} = {value!r}\n" for key, value in fault.items()) for fault in faults
     ).replace("True", "true").replace("False", "false")
@@ -41,8 +42,8 @@ def record(folder, faults, *stage_options, basis="single", cycles=CYCLES, code=0
     (folder / "faults.toml").write_text(text)
     options = ["--inject", folder / "faults.toml"] if faults else []
     archive = folder / "take.rfa"
-    with VirtualStage(folder / "work", "spheres.toml", *options, *stage_options) as stage:
-        report = stage.stagectl(
+    with VirtualStage(folder / "work", "spheres.toml", *options, *stage_options, stage=stage) as running:
+        report = running.stagectl(
             "run", "--sequence", sequence(basis), "--nominal", "--cycles", cycles, "-o", archive, "--json", *run_options,
             code=code,
         )
@@ -114,29 +115,34 @@ def test_a_board_that_resets_ends_the_take_with_what_was_proved(tmp_path, clean,
     expect_same(archive, clean, 0)
 
 
-def test_a_frozen_picture_in_a_lit_landmark_takes_down_its_stretch_and_nothing_else(tmp_path, clean):
-    archive, _ = record(tmp_path / "take", [{"kind": "freeze", "trigger": STRUCK["tracking"]}], code=2)
+def test_old_buffers_are_known_by_their_bits_in_every_kind_of_slot_and_cost_that_slot(tmp_path, clean):
+    """The stamps are right, and no optical code knows a basis slot: it is the camera's noise that never comes twice."""
+    struck = [*STRUCK.values(), STRUCK["basis"] + 20]
+    archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": trigger} for trigger in struck], code=2)
+    assert missing_triggers(archive) == set(struck)
+    assert all("stale: the camera's frame" in slot["why"] and "1 frames before" in slot["why"] for slot in identification(archive)["missing"])
+    assert report["stale_buffers"] == identification(archive)["stale_buffers"] == len(struck)
+    assert report["frames_without_noise"] == 0
+    expect_same(archive, clean, 0)
+    expect_same(archive, clean, 1, [row for row in (slots_of("single")[trigger - CYCLE]["row"] for trigger in struck) if row >= 0])
+    expect_same(archive, clean, 2)
+
+
+def test_a_frozen_picture_without_noise_in_a_lit_landmark_takes_down_its_stretch_and_nothing_else(tmp_path):
+    """Without noise honest frames come the same again: their bits tell nothing, and the optical code is left."""
+    stage = SMALL_STAGE + "noise_read_counts = 0\nnoise_shot = 0\n"
+    whole, _ = record(tmp_path / "whole", [], stage=stage)
+    archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": STRUCK["tracking"]}], stage=stage, code=2)
+    assert report["stale_buffers"] == 0 and report["frames_without_noise"] == report["frames"] == CYCLES * CYCLE
     missing = missing_triggers(archive)
     # Back to the tracking slot before it. The matte slot in between proves nothing in a scene without a matte board: it
     # is as dark as a lamp behind the spheres.
     assert missing == set(range(STRUCK["tracking"] - 17, STRUCK["tracking"] + 1))
     assert identification(archive)["missing"][0]["why"].startswith("the optical code disagrees")
-    expect_same(archive, clean, 0)
+    expect_same(archive, whole, 0)
     rows = [slots_of("single")[trigger - CYCLE]["row"] for trigger in missing]
-    expect_same(archive, clean, 1, [row for row in rows if row >= 0])
-    expect_same(archive, clean, 2)
-
-
-def test_an_old_buffer_in_a_basis_slot_is_known_by_its_bits_and_costs_that_slot(tmp_path, clean):
-    """No optical code knows a basis slot, and the stamps are right: it is the camera's noise that never comes twice."""
-    struck = [STRUCK["basis"], STRUCK["basis"] + 20]
-    archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": trigger} for trigger in struck], code=2)
-    assert missing_triggers(archive) == set(struck) and report["stale_buffers"] == 2
-    assert all("stale: the camera's frame" in slot["why"] and "1 frames before" in slot["why"] for slot in identification(archive)["missing"])
-    assert identification(archive)["stale_buffers"] == 2 and report["frames_without_noise"] == 0
-    expect_same(archive, clean, 0)
-    expect_same(archive, clean, 1, [slots_of("single")[trigger - CYCLE]["row"] for trigger in struck])
-    expect_same(archive, clean, 2)
+    expect_same(archive, whole, 1, [row for row in rows if row >= 0])
+    expect_same(archive, whole, 2)
 
 
 def basis_slot(basis, nth=50):

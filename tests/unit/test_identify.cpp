@@ -226,7 +226,7 @@ const Fault faults[] = {
      },
      only_it},
     {"swapped", [](Take& t, uint64_t n) { std::swap(t.frames[n], t.frames[n + 1]); }, nothing},
-    {"wrong size", [](Take& t, uint64_t n) { t.frames[n].witness.whole = false; }, only_it},
+    {"wrong size", [](Take& t, uint64_t n) { t.frames[n].witness.unfit = "its size"; }, only_it},
     {"bad timestamp", [](Take& t, uint64_t n) { t.frames[n].witness.stamp.timestamp_ns += 150'000; }, only_it},
     {"log entry lost", [](Take& t, uint64_t n) { t.log.erase(t.log.begin() + ptrdiff_t(n)); }, only_it},
     {"log entry of another slot", [](Take& t, uint64_t n) { ++t.log[n].slot; }, only_it},
@@ -304,6 +304,25 @@ TEST(Identify, a_camera_that_is_gone_is_why_its_later_frames_are_missing_and_not
     EXPECT_NE(outcome.notes.at(lost).why, "the camera is gone");
 }
 
+TEST(Identify, an_unfit_frame_costs_its_own_slot_whatever_it_looks_like) {
+    SyntheticStage stage("single", 3);
+    const Take clean = record(stage);
+    const auto& slots = stage.sequence.slots;
+    for (const SlotKind kind : {SlotKind::tracking, SlotKind::matte, SlotKind::dark, SlotKind::basis}) {
+        size_t slot = 40;
+        while (slots[slot].kind != kind) ++slot;
+        const size_t trigger = slots.size() + slot;
+        Take take = clean;
+        take.frames[trigger].witness.unfit = "stale";
+        take.frames[trigger].witness.summary = take.frames[trigger - 1].witness.summary;
+        const Outcome outcome = play(take, stage.sequence);
+        EXPECT_EQ(outcome.missing, std::set<uint64_t>{trigger}) << slot_kind_name(kind);
+        EXPECT_EQ(outcome.notes.at(trigger).why, "stale");
+        EXPECT_TRUE(outcome.notes.at(trigger).board && outcome.notes.at(trigger).camera && outcome.accounted);
+        EXPECT_EQ(outcome.mislabelled, 0);
+    }
+}
+
 TEST(Identify, duplicates_are_counted) {
     SyntheticStage stage("single", 2);
     Take take = record(stage);
@@ -317,7 +336,7 @@ TEST(Identify, a_missing_slot_tells_which_witnesses_it_had) {
     SyntheticStage stage("single", 2);
     Take take = record(stage);
     take.frames[216].witness.summary = take.frames[220].witness.summary;  // a tracking slot that looks like a lamp
-    take.frames[50].witness.whole = false;
+    take.frames[50].witness.unfit = "its size";
     take.frames.erase(take.frames.begin() + 100);
     take.log.erase(take.log.begin() + 150);
     const Outcome outcome = play(take, stage.sequence);
