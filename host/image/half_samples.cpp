@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #if defined(__x86_64__)
+#include <cpuid.h>
 #include <immintrin.h>
 #endif
 
@@ -22,10 +23,16 @@ __attribute__((target("avx,f16c"))) size_t to_halves_by_eight(std::span<const fl
     return i;
 }
 
+// Not __builtin_cpu_supports("f16c"), which clang 14 does not know.
+bool has_f16c() {
+    unsigned eax = 0, ebx = 0, ecx = 0, edx = 0;
+    return __builtin_cpu_supports("avx") && __get_cpuid(1, &eax, &ebx, &ecx, &edx) && (ecx & bit_F16C);
+}
+
 // How many of the first were converted.
 size_t to_halves_fast(std::span<const float> floats, half* halves) {
-    static const bool has_f16c = __builtin_cpu_supports("avx") && __builtin_cpu_supports("f16c");
-    return has_f16c ? to_halves_by_eight(floats, halves) : 0;
+    static const bool by_eight = has_f16c();
+    return by_eight ? to_halves_by_eight(floats, halves) : 0;
 }
 #else
 size_t to_halves_fast(std::span<const float>, half*) {
