@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "image/input_file.hpp"
-#include "photographs/container_label.hpp"
 #include "photographs/stated_size.hpp"
 
 namespace ols {

@@ -9,10 +9,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 #include "photographs/heif.hpp"
 #include "photographs/stated_size.hpp"
+#include "photographs/webp_label.hpp"
 
 namespace ols {
 

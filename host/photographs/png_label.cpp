@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "image/input_file.hpp"
-#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 
 namespace ols {
