@@ -87,9 +87,9 @@ Result<ColorLabel> label_of_codes(int primaries, int transfer, const std::string
     label.is_srgb = is_srgb_curve && (primaries == bt709 || primaries == unsaid);
     if (label.is_srgb) return label;
     if (primaries == bt2020)
-        label.primaries = Primaries{{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
+        label.primaries = rec2020_primaries;
     else if (primaries == display_p3)
-        label.primaries = Primaries{{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
+        label.primaries = p3_d65_primaries;
     else if (primaries == bt709 || primaries == unsaid)
         label.primaries = rec709_primaries;
     else

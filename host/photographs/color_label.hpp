@@ -25,9 +25,6 @@ struct ColorLabel {
     bool is_srgb = false;  // said in so many words
 };
 
-// Adobe RGB (1998), section 4.3.1.
-inline constexpr Primaries adobe_primaries = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
-
 // sRGB as a table of 4096 entries, light 0..65535 by code.
 std::vector<uint16_t> srgb_curve();
 

@@ -7,16 +7,11 @@
 #include <string_view>
 
 #include "image/input_file.hpp"
+#include "photographs/file_damage.hpp"
 
 namespace ols {
 
 namespace {
-
-constexpr uint64_t largest_file = uint64_t(1) << 32;
-
-Error damaged(const std::string& path, const std::string& why) {
-    return fail("'" + path + "' is damaged (" + why + "): copy it again");
-}
 
 uint32_t little_word(std::string_view bytes, size_t at) {
     uint32_t value = 0;
@@ -27,14 +22,15 @@ uint32_t little_word(std::string_view bytes, size_t at) {
 }  // namespace
 
 Result<WebpLabel> read_webp_label(const std::string& path) {
-    const auto bytes = read_input(path, "picture", largest_file);
+    const auto bytes = read_input(path, "picture", largest_picture_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
-    if (file.size() < 12 || uint64_t(little_word(file, 4)) + 8 > file.size()) return damaged(path, "it is cut short");
+    if (file.size() < 12 || uint64_t(little_word(file, 4)) + 8 > file.size())
+        return damaged_picture(path, "it is cut short");
     WebpLabel result;
     for (size_t at = 12; at + 8 <= file.size();) {
         const size_t length = little_word(file, at + 4);
-        if (length > file.size() - at - 8) return damaged(path, "it is cut short");
+        if (length > file.size() - at - 8) return damaged_picture(path, "it is cut short");
         const std::string_view type = file.substr(at, 4), data = file.substr(at + 8, length);
         if (type == "ICCP") {
             result.label.profile.assign(data.begin(), data.end());
