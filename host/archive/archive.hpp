@@ -140,11 +140,11 @@ class TargetReader {
     // Everything but its samples: size, colour filter, missing lamps, provenance, times of its motion, frames of its matte.
     const Target& head() const;
 
-    // How many rows, whole tiles, can be read at once so that their lamps take no more than 512 MB.
+    // How many rows, whole tiles, can be read at once so that their lamps take no more than 512 MB, or one row of tiles.
     int strip_rows() const;
 
-    // A part of it, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels. Memory: the box times
-    // lamps * planes * 4 bytes, and as much again while it is cut from its tiles.
+    // A part of it, as a target of the box's size; any box inside it, fastest when aligned to 64 pixels. Memory: the tiles
+    // that the box touches times lamps * planes * 4 bytes, and one plane more while it is cut from them.
     Result<Target> read_box(const Box& box) const;
     Result<Target> read() const;
 

@@ -72,6 +72,8 @@ ExrInput::ExrInput(const ArchiveFile& file) : Imf::IStream(file.path().c_str()),
 
 bool ExrInput::read(char bytes[], int count) {
     const auto wanted = uint64_t(count);
+    // A file may say that its tiles lie anywhere.
+    if (wanted > file_.size() || position_ > file_.size() - wanted) throw std::runtime_error("it ends early");
     const auto fill = [&](uint64_t at, char* out, size_t most) {
         const auto read_bytes = file_.read(at, out, most);
         if (!read_bytes) throw std::runtime_error(read_bytes.error().message);

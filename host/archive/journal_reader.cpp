@@ -129,15 +129,18 @@ class Parser {
         sort_targets();
         check_expected();
         if (journal_.ended) check_counts();
-        if (is_hopeless())
+        if (was_cut_short_)
             journal_.problems.push_back(
                 fmt::format("{}: has more than {} problems: the rest was not looked at", journal_name, problems_max));
     }
 
     void add_problem(const std::string& problem) {
-        if (!is_hopeless()) journal_.problems.push_back(problem);
+        if (journal_.problems.size() < problems_max)
+            journal_.problems.push_back(problem);
+        else
+            was_cut_short_ = true;
     }
-    bool is_hopeless() const { return journal_.problems.size() >= problems_max; }
+    bool is_hopeless() const { return was_cut_short_; }
 
   private:
     std::string where() const { return fmt::format("{}:{}", journal_name, number_); }
@@ -247,6 +250,7 @@ class Parser {
     int number_ = 0;
     uint32_t before_ = 0;  // the CRC-32 of all lines so far, as far as they agree
     uint64_t written_ = 0, missing_ = 0;
+    bool was_cut_short_ = false;  // there was a problem too many
 };
 
 }  // namespace

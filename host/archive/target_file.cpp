@@ -188,10 +188,6 @@ Status write_parts(ExrStream& stream, const TakeInfo& info, const Target& head, 
     return Done{};
 }
 
-}  // namespace
-
-namespace {
-
 // What a reader would refuse is not written.
 Status check_target(const TakeInfo& info, const Target& head) {
     if (const Status size = check_mosaic_size(head.cfa, head.width, head.height); !size) return size;

@@ -12,7 +12,7 @@ namespace ols {
 std::string target_file_name(uint32_t camera, uint32_t index);
 
 // Writes and syncs `path` in blocks of whole tiles, so that no more than some 64 MB (or one tile of all planes) is held.
-// What a reader would refuse is an error. On error the file is removed. `head.lamps` is not looked at.
+// Sizes, lamps, times and attributes that a reader would refuse are errors. On error the file is removed. `head.lamps` is not looked at.
 Status write_target_file(const std::string& path, const TakeInfo& info, const Target& head, const PlaneSource& source);
 
 }  // namespace ols

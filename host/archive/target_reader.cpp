@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <optional>
 
 #include "archive/archive.hpp"
 #include "archive/archive_file.hpp"

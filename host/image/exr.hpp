@@ -20,6 +20,7 @@ enum class ExrType { half_float, single_float };
 struct ExrChoice {
     std::optional<std::string> part = std::nullopt;   // its name or number
     std::optional<std::string> layer = std::nullopt;  // "beauty" for beauty.R beauty.G beauty.B
+    bool convert = true;                              // to Rec. 709, where its primaries are others
     bool turn = true;  // upright, if the file says (as OpenImageIO writes it) that its pixels lie turned or mirrored
 };
 

@@ -11,9 +11,6 @@ namespace ols {
 
 namespace {
 
-constexpr Primaries rec2020 = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
-constexpr Primaries p3_d65 = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
-constexpr Primaries adobe_rgb = {{0.640, 0.330}, {0.210, 0.710}, {0.150, 0.060}, {0.3127, 0.3290}};
 constexpr Primaries ap0 = {{0.7347, 0.2653}, {0.0, 1.0}, {0.0001, -0.0770}, {0.32168, 0.33767}};
 constexpr Primaries ap1 = {{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}, {0.32168, 0.33767}};
 
@@ -25,11 +22,11 @@ const std::map<std::string, Primaries>& linear_spaces() {
                                                             {"Linear", rec709_primaries},
                                                             {"linear", rec709_primaries},
                                                             {"scene_linear", rec709_primaries},
-                                                            {"lin_rec2020_scene", rec2020},
-                                                            {"lin_rec2020", rec2020},
-                                                            {"lin_p3d65_scene", p3_d65},
-                                                            {"lin_p3d65", p3_d65},
-                                                            {"lin_adobergb_scene", adobe_rgb},
+                                                            {"lin_rec2020_scene", rec2020_primaries},
+                                                            {"lin_rec2020", rec2020_primaries},
+                                                            {"lin_p3d65_scene", p3_d65_primaries},
+                                                            {"lin_p3d65", p3_d65_primaries},
+                                                            {"lin_adobergb_scene", adobe_primaries},
                                                             {"lin_ap0_scene", ap0},
                                                             {"lin_ap0", ap0},
                                                             {"ACES2065-1", ap0},

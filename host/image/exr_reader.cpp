@@ -99,7 +99,7 @@ void say_windows(const Window& data, const Window& display, std::vector<std::str
         said.push_back(windows + (beyond ? "what lies outside was cropped" : "the rest was filled with black"));
 }
 
-Status make_rec709(FloatPicture& picture, const Imf::Header& header, ExrColour colour) {
+Status make_rec709(FloatPicture& picture, const Imf::Header& header, ExrColour colour, bool convert) {
     const auto stated = stated_exr_colour(header);
     if (!stated) return stated.error();
     picture.is_rec709 = stated->known;
@@ -112,6 +112,11 @@ Status make_rec709(FloatPicture& picture, const Imf::Header& header, ExrColour c
         picture.said.push_back("luminance and chroma (Y RY BY) were converted to R G B");
     }
     if (are_rec709(stated->primaries)) return Done{};
+    if (!convert) {
+        picture.is_rec709 = false;
+        picture.said.push_back("its primaries are left out");
+        return Done{};
+    }
     const Primaries& p = stated->primaries;
     picture.said.push_back(fmt::format(
         "its primaries R ({:.4g}, {:.4g}), G ({:.4g}, {:.4g}), B ({:.4g}, {:.4g}), white ({:.4g}, {:.4g}) were "
@@ -155,7 +160,7 @@ void turn(FloatPicture& picture) {
     picture.said.push_back(fmt::format("turned or mirrored as it says (Orientation {})", picture.orientation));
 }
 
-Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& layer) {
+Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& layer, bool convert) {
     const auto orientation = stated_orientation(file.header(layer.part));
     if (!orientation) return orientation.error();
     if (!file.partComplete(layer.part))
@@ -168,7 +173,7 @@ Result<FloatPicture> read_part(Imf::MultiPartInputFile& file, const ExrLayer& la
     say_header(header, picture);
     say_windows(header.dataWindow(), header.displayWindow(), picture.said);
     picture.pixels = with_usual_channels(read_layer(part, layer));
-    if (const Status done = make_rec709(picture, header, layer.colour); !done) return done.error();
+    if (const Status done = make_rec709(picture, header, layer.colour, convert); !done) return done.error();
     picture.pixels = placed(std::move(picture.pixels), header.dataWindow(), header.displayWindow());
     return picture;
 }
@@ -184,7 +189,7 @@ Result<FloatPicture> read_stream(std::ifstream& stream, const std::string& path,
     for (int i = 0; i < file.parts(); ++i) headers.push_back(&file.header(i));
     const auto layer = choose_exr_layer(headers, choice);
     if (!layer) return layer.error();
-    auto picture = read_part(file, *layer);
+    auto picture = read_part(file, *layer, choice.convert);
     if (picture && !layer->name.empty() && !choice.layer)
         picture->said.insert(picture->said.begin(), "its layer '" + layer->name + "' was taken");
     if (picture && choice.turn) turn(*picture);
@@ -207,9 +212,9 @@ Result<FloatPicture> read_exr_picture(const std::string& path, const ExrChoice& 
     if (!begins_as_exr(bytes)) return cannot("it is " + kind_of_bytes(bytes) + ": name an .exr file");
     stream->clear();
     stream->seekg(0);
-    if (const Status fits = check_exr_sizes(*stream, std::filesystem::file_size(path)); !fits)
-        return cannot(fits.error().message);
     try {
+        if (const Status fits = check_exr_sizes(*stream, std::filesystem::file_size(path)); !fits)
+            return cannot(fits.error().message);
         auto picture = read_stream(*stream, path, choice);
         if (!picture) return cannot(picture.error().message);
         return picture;

@@ -18,6 +18,10 @@ struct Primaries {
 };
 
 inline constexpr Primaries rec709_primaries = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}};
+inline constexpr Primaries rec2020_primaries = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
+inline constexpr Primaries p3_d65_primaries = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
+// Adobe RGB (1998), section 4.3.1.
+inline constexpr Primaries adobe_primaries = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
 inline constexpr Chromaticity equal_energy_white = {1.0 / 3, 1.0 / 3};
 
 // Within 1e-4 in every coordinate, which is what files round to.

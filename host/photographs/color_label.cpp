@@ -73,6 +73,34 @@ bool agrees_with_srgb(const ColorConversion& conversion, int channels) {
 
 }  // namespace
 
+Result<ColorLabel> label_of_codes(int primaries, int transfer, const std::string& name) {
+    // Transfers: 1, 6, 14 and 15 are video's curve, which pictures of sRGB's are often said to have; 2 is not said; 8 is linear; 13 sRGB's.
+    constexpr int bt709 = 1, unsaid = 2, bt2020 = 9, display_p3 = 12;
+    if (transfer == 16 || transfer == 18)
+        return fail(fmt::format("is coded for a display ({})", transfer == 16 ? "PQ" : "HLG"));
+    const bool is_srgb_curve = transfer == 13 || transfer == 1 || transfer == 6 || transfer == 14 || transfer == 15;
+    if (!is_srgb_curve && transfer != unsaid && transfer != 8)
+        return fail(fmt::format("has a transfer of an unusual kind (code {} of H.273)", transfer));
+    ColorLabel label;
+    if (transfer == unsaid && (primaries == unsaid || primaries == bt709)) return label;
+    label.name = name;
+    label.is_srgb = is_srgb_curve && (primaries == bt709 || primaries == unsaid);
+    if (label.is_srgb) return label;
+    if (primaries == bt2020)
+        label.primaries = rec2020_primaries;
+    else if (primaries == display_p3)
+        label.primaries = p3_d65_primaries;
+    else if (primaries == bt709 || primaries == unsaid)
+        label.primaries = rec709_primaries;
+    else
+        return fail(fmt::format("has primaries of an unusual kind (code {} of H.273)", primaries));
+    if (transfer == 8)
+        label.gamma = 1;
+    else
+        label.curves.fill(srgb_curve());
+    return label;
+}
+
 Result<ColorConversion> ColorConversion::create(const ColorLabel& label, int channels) {
     cmsSetLogErrorHandler([](cmsContext, cmsUInt32Number, const char*) {});  // what fails is told below
     if (label.primaries && label.profile.empty())

@@ -25,11 +25,11 @@ struct ColorLabel {
     bool is_srgb = false;  // said in so many words
 };
 
-// Adobe RGB (1998), section 4.3.1.
-inline constexpr Primaries adobe_primaries = {{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, {0.3127, 0.3290}};
-
 // sRGB as a table of 4096 entries, light 0..65535 by code.
 std::vector<uint16_t> srgb_curve();
+
+// Colour codes of ITU-T H.273 as a label. Errors (without the file's name): a transfer for displays, primaries of another kind.
+Result<ColorLabel> label_of_codes(int primaries, int transfer, const std::string& name);
 
 // A way from codes (0 to 1) to linear light, colours adapted to D65 by Bradford's matrix (relative colorimetric, by Little CMS).
 class ColorConversion {

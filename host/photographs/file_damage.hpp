@@ -3,6 +3,7 @@
 // of its colours that OpenImageIO does not hand on.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,12 @@
 
 namespace ols {
 
+inline constexpr uint64_t largest_picture_file = uint64_t(1) << 32;
+
+inline Error damaged_picture(const std::string& path, const std::string& why) {
+    return fail("'" + path + "' is damaged (" + why + "): copy it again");
+}
+
 // Decodes a JPEG file's entropy-coded data and makes an error of every warning of libjpeg's: a code that is none, data cut short, bytes
 // left over before a marker. CMYK is refused. A changed bit that gives another valid code leaves no trace in this format.
 Status check_jpeg(const std::string& path);
@@ -20,6 +27,7 @@ Status check_jpeg(const std::string& path);
 // cICP, iCCP, sRGB, gAMA and cHRM say (11.3.2). Errors: damaged, or coded for a display (PQ, HLG) or in Y'CbCr.
 Result<ColorLabel> read_png_label(const std::string& path);
 
+inline constexpr int photometric_palette = 3;                                  // TIFF 6.0
 inline constexpr int photometric_cfa = 32803, photometric_linear_raw = 34892;  // TIFF/EP, DNG
 
 struct TiffPage {

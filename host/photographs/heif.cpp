@@ -9,14 +9,12 @@
 #include <memory>
 
 #include "image/input_file.hpp"
-#include "photographs/container_label.hpp"
+#include "photographs/file_damage.hpp"
 #include "photographs/stated_size.hpp"
 
 namespace ols {
 
 namespace {
-
-constexpr uint64_t largest_file = uint64_t(1) << 32;
 
 template <auto release>
 struct Release {
@@ -30,18 +28,14 @@ using Handle = std::unique_ptr<heif_image_handle, Release<heif_image_handle_rele
 using Options = std::unique_ptr<heif_decoding_options, Release<heif_decoding_options_free>>;
 using Decoded = std::unique_ptr<heif_image, Release<heif_image_release>>;
 
-Error damaged(const std::string& path, const std::string& why) {
-    return fail("'" + path + "' is damaged (" + why + "): copy it again");
-}
-
 Result<Handle> open_page(heif_context* context, const std::string& path, int page) {
     std::vector<heif_item_id> ids(size_t(std::max(heif_context_get_number_of_top_level_images(context), 0)));
     ids.resize(size_t(heif_context_get_list_of_top_level_image_IDs(context, ids.data(), int(ids.size()))));
-    if (ids.empty()) return damaged(path, "it holds no picture");
+    if (ids.empty()) return damaged_picture(path, "it holds no picture");
     if (auto s = check_page(path, int(ids.size()), page); !s) return s.error();
     heif_image_handle* handle = nullptr;
     const auto got = heif_context_get_image_handle(context, ids[size_t(std::max(page, 1) - 1)], &handle);
-    if (got.code != heif_error_Ok) return damaged(path, got.message);
+    if (got.code != heif_error_Ok) return damaged_picture(path, got.message);
     return Handle(handle);
 }
 
@@ -52,7 +46,7 @@ Result<ColorLabel> label_of(heif_image_handle* handle, const std::string& path) 
         label.profile.resize(heif_image_handle_get_raw_color_profile_size(handle));
         label.name = "its profile";
         const auto got = heif_image_handle_get_raw_color_profile(handle, label.profile.data());
-        if (got.code != heif_error_Ok) return damaged(path, got.message);
+        if (got.code != heif_error_Ok) return damaged_picture(path, got.message);
         return label;
     }
     heif_color_profile_nclx* codes = nullptr;
@@ -81,9 +75,9 @@ Result<Decoded> decode(heif_image_handle* handle, heif_chroma chroma, const std:
     heif_image* decoded = nullptr;
     const auto done = heif_decode_image(handle, &decoded, heif_colorspace_RGB, chroma, options.get());
     Decoded image(decoded);
-    if (done.code != heif_error_Ok) return damaged(path, done.message);
+    if (done.code != heif_error_Ok) return damaged_picture(path, done.message);
     heif_error warning;
-    if (heif_image_get_decoding_warnings(decoded, 0, &warning, 1) > 0) return damaged(path, warning.message);
+    if (heif_image_get_decoding_warnings(decoded, 0, &warning, 1) > 0) return damaged_picture(path, warning.message);
     return image;
 }
 
@@ -121,10 +115,10 @@ Status read_codes(heif_image_handle* handle, const std::string& path, int bits, 
     const int width = heif_image_get_width(image->get(), heif_channel_interleaved);
     const int height = heif_image_get_height(image->get(), heif_channel_interleaved);
     if (!plane || width != samples.width || height != samples.height)
-        return damaged(path,
-                       fmt::format("it says {} x {} and holds {} x {}", samples.width, samples.height, width, height));
+        return damaged_picture(
+            path, fmt::format("it says {} x {} and holds {} x {}", samples.width, samples.height, width, height));
     const int row_samples = width * samples.channels;
-    if (stride < row_samples * (wide ? 2 : 1)) return damaged(path, "its rows are too short");
+    if (stride < row_samples * (wide ? 2 : 1)) return damaged_picture(path, "its rows are too short");
     if (wide)
         samples.codes = wide_codes(plane, stride, row_samples, height, bits);
     else
@@ -135,12 +129,12 @@ Status read_codes(heif_image_handle* handle, const std::string& path, int bits, 
 }  // namespace
 
 Result<HeifPicture> read_heif(const std::string& path, int page) {
-    const auto bytes = read_input(path, "picture", largest_file);
+    const auto bytes = read_input(path, "picture", largest_picture_file);
     if (!bytes) return bytes.error();
     const Context context(heif_context_alloc());
     heif_context_set_maximum_image_size_limit(context.get(), 65535);
     const auto read = heif_context_read_from_memory_without_copy(context.get(), bytes->data(), bytes->size(), nullptr);
-    if (read.code != heif_error_Ok) return damaged(path, read.message);
+    if (read.code != heif_error_Ok) return damaged_picture(path, read.message);
     const auto opened = open_page(context.get(), path, page);
     if (!opened) return opened.error();
     heif_image_handle* handle = opened->get();
@@ -154,10 +148,9 @@ Result<HeifPicture> read_heif(const std::string& path, int page) {
     samples.alpha = samples.channels == 4 ? 3 : -1;
     samples.is_multiplied = samples.alpha >= 0 && heif_image_handle_is_premultiplied_alpha(handle);
     const int bits = heif_image_handle_get_luma_bits_per_pixel(handle);
-    if (bits < 8 || bits > 16) return damaged(path, fmt::format("it says it has {} bits", bits));
+    if (bits < 8 || bits > 16) return damaged_picture(path, fmt::format("it says it has {} bits", bits));
     samples.last_code = (1 << bits) - 1;
-    if (auto s = check_stated_size(path, samples.width, samples.height, samples.channels * (bits > 8 ? 2 : 1), true);
-        !s)
+    if (auto s = check_stated_size(path, samples.width, samples.height, samples.channels * (bits > 8 ? 2 : 1)); !s)
         return s.error();
     auto label = label_of(handle, path);
     if (!label) return label.error();

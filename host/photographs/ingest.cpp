@@ -9,14 +9,15 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
-#include <thread>
 
+#include "exceptions.hpp"
 #include "photographs/light_intensities.hpp"
 #include "photographs/picture_names.hpp"
 #include "photographs/plane_spool.hpp"
 #include "photographs/set_notes.hpp"
 #include "photographs/subject_mask.hpp"
 #include "stage/light_file.hpp"
+#include "worker_threads.hpp"
 
 namespace ols {
 
@@ -109,10 +110,12 @@ Result<Pictures> read_pictures(const std::vector<std::string>& paths, const std:
     int done = 1;
     std::mutex reporting;
     std::vector<std::string> errors(paths.size());
-    const auto work = [&] {
+    run_workers(thread_count(0), [&](int) {
         for (int i; (i = next++) < int(paths.size()) && i < failed;) {
-            const auto picture = read_picture(paths[i], options.picture);
-            const Status kept = picture ? keep(i, *picture) : picture.error();
+            const Status kept = guarded("cannot take '" + paths[i] + "'", [&]() -> Status {
+                const auto picture = read_picture(paths[i], options.picture);
+                return picture ? keep(i, *picture) : picture.error();
+            });
             if (!kept) {
                 errors[i] = kept.error().message;
                 int lowest = failed;
@@ -122,12 +125,7 @@ Result<Pictures> read_pictures(const std::vector<std::string>& paths, const std:
             const std::scoped_lock lock(reporting);
             options.progress(++done, int(paths.size()));
         }
-    };
-    {
-        std::vector<std::jthread> others;
-        for (unsigned t = 1; t < std::max(1u, std::thread::hardware_concurrency()); ++t) others.emplace_back(work);
-        work();
-    }
+    });
     if (failed < int(paths.size())) return fail(errors[failed]);
     return pictures;
 }

@@ -38,18 +38,24 @@ Result<std::vector<Intensity>> read_light_intensities(const std::string& path,
     const auto lines = read_text_lines(path);
     if (!lines) return lines.error();
     std::map<std::string, size_t> light_of;
+    for (size_t i = 0; i < lights.size(); ++i) light_of.try_emplace(lights[i].name, i);
     for (size_t i = 0; i < lights.size(); ++i) light_of.try_emplace(base_name(lights[i].name), i);
     std::vector<std::optional<Intensity>> found(lights.size());
     size_t count = 0;
+    bool have_names = false;
     for (const auto& line : *lines) {
         const auto parsed = parse(line.text);
         const auto where = fmt::format("{}:{}", path, line.number);
         if (!parsed)
             return fail(where + ": '" + line.text +
                         "' is no intensity: write one number or R G B, above 0, a line for each light");
+        if (count == 0) have_names = !parsed->name.empty();
+        if (parsed->name.empty() == have_names)
+            return fail(where + ": some lines have names and others none: write all or none");
         size_t index = count;
-        if (!parsed->name.empty()) {
-            const auto light = light_of.find(base_name(parsed->name));
+        if (have_names) {
+            auto light = light_of.find(parsed->name);
+            if (light == light_of.end()) light = light_of.find(base_name(parsed->name));
             if (light == light_of.end())
                 return fail(where + ": '" + parsed->name + "' is none of the lights of the .lp file");
             index = light->second;
@@ -62,10 +68,7 @@ Result<std::vector<Intensity>> read_light_intensities(const std::string& path,
         return fail(fmt::format("'{}' has {} intensities, the .lp file {} lights: one line for each light", path, count,
                                 lights.size()));
     std::vector<Intensity> intensities;
-    for (const auto& intensity : found) {
-        if (!intensity) return fail("'" + path + "': some lines have names and others none: write all or none");
-        intensities.push_back(*intensity);
-    }
+    for (const auto& intensity : found) intensities.push_back(*intensity);  // as many as lights, each once
     return intensities;
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "exceptions.hpp"
 #include "image/exr.hpp"
 #include "image/orientation.hpp"
 #include "image/radiance.hpp"
@@ -176,7 +177,12 @@ std::optional<Image> take_alpha(Image& image) {
 
 // OpenEXR and Radiance.
 Result<Picture> read_floats(const std::string& path, PictureFormat format, const PictureOptions& options) {
-    auto read = format == PictureFormat::openexr ? read_exr_picture(path, {.turn = false}) : read_radiance(path);
+    const bool srgb = options.transfer == Transfer::srgb;
+    if (srgb && format == PictureFormat::radiance)
+        return fail("'" + path + "' is a Radiance picture, which is linear: leave out --transfer srgb");
+    // Primaries are of light, which codes of sRGB's curve are not yet.
+    auto read = format == PictureFormat::openexr ? read_exr_picture(path, {.convert = !srgb, .turn = false})
+                                                 : read_radiance(path);
     if (!read) return read.error();
     Picture picture;
     picture.orientation = read->orientation;
@@ -186,9 +192,8 @@ Result<Picture> read_floats(const std::string& path, PictureFormat format, const
         picture.said.push_back("alpha is left out; the colours are multiplied by it as the file has them");
     picture.light = std::move(read->pixels);
     picture.cfa = picture.light.channels == 3 ? Cfa::rgb : Cfa::none;
-    picture.is_rec709 = read->is_rec709 && options.transfer != Transfer::srgb;
+    picture.is_rec709 = read->is_rec709 && !srgb;
     const float scale = options.full_scale > 0 ? float(1 / options.full_scale) : 1;
-    const bool srgb = options.transfer == Transfer::srgb;
     if (srgb || scale != 1)
         for (float& v : picture.light.data) v = srgb ? srgb_decode(v * scale) : v * scale;
     return picture;
@@ -215,13 +220,11 @@ void turn(Picture& picture) {
 }  // namespace
 
 Result<Picture> read_picture(const std::string& path, const PictureOptions& options) {
-    try {
+    return guarded("cannot read '" + path + "'", [&] {
         auto picture = read_any(path, options);
         if (picture.ok() && options.turn) turn(*picture);
         return picture;
-    } catch (const std::bad_alloc&) {
-        return fail("'" + path + "' does not fit into memory");
-    }
+    });
 }
 
 }  // namespace ols

@@ -74,8 +74,10 @@ std::string base_name(const std::string& path) {
 Result<std::set<std::string>> file_names(const std::string& folder) {
     std::set<std::string> names;
     std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error))
-        if (entry.is_regular_file(error)) names.insert(entry.path().filename().string());
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+        std::error_code none_of_ours;  // a link that leads nowhere
+        if (entry->is_regular_file(none_of_ours)) names.insert(entry->path().filename().string());
+    }
     if (error) return fail("cannot read folder '" + folder + "': " + error.message());
     return names;
 }

@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <type_traits>
 
-#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 #include "photographs/heif.hpp"
 #include "photographs/stated_size.hpp"
+#include "photographs/webp_label.hpp"
 
 namespace ols {
 
@@ -71,7 +73,7 @@ Status sort_channels(const ImageSpec& spec, const std::string& path, PictureSamp
     samples.alpha = spec.alpha_channel;
     samples.is_multiplied = samples.alpha >= 0 && spec.get_int_attribute("oiio:UnassociatedAlpha", 0) == 0;
     const std::string space = spec.get_string_attribute("tiff:ColorSpace");
-    if (!space.empty() && space != "YCbCr")
+    if (!space.empty() && space != "YCbCr" && space != "palette")
         return fail("'" + path + "' is in " + space + " colours, which are no light: save it as R G B");
     samples.colors = spec.nchannels <= 2 ? 1 : 3;
     const int others = spec.nchannels - samples.colors;
@@ -156,14 +158,15 @@ Status read_two_codes(const std::string& path, int page, PictureSamples& samples
     return Done{};
 }
 
-// White is zero (TIFF 6.0 section 8): OpenImageIO turns samples of 8 bits only.
-void invert(PictureSamples& samples) {
-    if (auto* codes = std::get_if<std::vector<uint8_t>>(&samples.codes))
-        for (auto& code : *codes) code = uint8_t(255 - code);
-    if (auto* codes = std::get_if<std::vector<uint16_t>>(&samples.codes))
-        for (auto& code : *codes) code = uint16_t(65535 - code);
-    if (auto* codes = std::get_if<std::vector<float>>(&samples.codes))
-        for (auto& code : *codes) code = 1 - code;
+// White is zero (TIFF 6.0 section 8): OpenImageIO turns all channels of up to 8 bits, of more bits none. Alpha has no white.
+void invert(PictureSamples& samples, int first_channel, int end_channel) {
+    std::visit(
+        [&]<typename Code>(std::vector<Code>& codes) {
+            constexpr Code last = std::is_integral_v<Code> ? std::numeric_limits<Code>::max() : Code(1);
+            for (size_t i = 0; i < codes.size(); i += size_t(samples.channels))
+                for (int c = first_channel; c < end_channel; ++c) codes[i + c] = Code(last - codes[i + c]);
+        },
+        samples.codes);
 }
 
 bool openimageio_inverts(const TiffPage& page) {
@@ -175,7 +178,7 @@ Status check_photometric(const TiffPage& page, const std::string& path) {
         case 0:
         case 1:
         case 2:
-        case 3:
+        case photometric_palette:
         case 6: return Done{};  // white or black is zero, R G B, palette, Y'CbCr
         case 5: return fail("'" + path + "' is in CMYK, which is ink and no light: save it as R G B");
         case 4: return fail("'" + path + "' is a transparency mask of another picture: save it as grey");
@@ -244,11 +247,18 @@ Result<PictureSamples> read_checked(const std::string& path, PictureFormat forma
     if (samples.orientation < 1 || samples.orientation > 8)
         return fail(fmt::format("'{}' says its orientation is {}: the tag has 1 to 8; remove or correct it", path,
                                 samples.orientation));
-    const bool is_bilevel = index < tiff_pages.size() && tiff_pages[index].bits == 1 && tiff_pages[index].samples == 1;
+    const bool is_palette = index < tiff_pages.size() && tiff_pages[index].photometric == photometric_palette;
+    const bool is_bilevel =
+        index < tiff_pages.size() && tiff_pages[index].bits == 1 && tiff_pages[index].samples == 1 && !is_palette;
     if (auto s = is_bilevel ? read_two_codes(path, int(index), samples) : read_any_codes(*picture, path, samples); !s)
         return s.error();
-    if (index < tiff_pages.size() && tiff_pages[index].photometric == 0 && !openimageio_inverts(tiff_pages[index]))
-        invert(samples);
+    if (is_palette) samples.last_code = 255;  // its colours', not its indices'
+    if (index < tiff_pages.size() && tiff_pages[index].photometric == 0) {
+        if (openimageio_inverts(tiff_pages[index]))
+            invert(samples, samples.colors, samples.channels);
+        else
+            invert(samples, 0, samples.colors);
+    }
     return samples;
 }
 

@@ -6,14 +6,11 @@
 #include <string_view>
 
 #include "image/input_file.hpp"
-#include "photographs/container_label.hpp"
 #include "photographs/file_damage.hpp"
 
 namespace ols {
 
 namespace {
-
-constexpr uint64_t largest_file = uint64_t(1) << 32;
 
 uint32_t word(std::string_view bytes, size_t at) {
     uint32_t value = 0;
@@ -79,7 +76,7 @@ Status take_chunk(std::string_view type, std::string_view data, ColorLabel& labe
 }  // namespace
 
 Result<ColorLabel> read_png_label(const std::string& path) {
-    const auto bytes = read_input(path, "picture", largest_file);
+    const auto bytes = read_input(path, "picture", largest_picture_file);
     if (!bytes) return bytes.error();
     const std::string_view file = *bytes;
     const auto damaged = [&](const std::string& why) {

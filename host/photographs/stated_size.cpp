@@ -8,14 +8,26 @@
 
 namespace ols {
 
-Status check_stated_size(const std::string& path, double width, double height, double bytes_a_pixel, bool packs_flat) {
+namespace {
+
+double size_of(const std::string& path) {
     std::error_code error;
-    const double file = double(std::filesystem::file_size(path, error));
+    const auto size = std::filesystem::file_size(path, error);
+    return error ? 0 : double(size);
+}
+
+}  // namespace
+
+bool can_hold(const std::string& path, double bytes) {
+    return bytes <= std::max(64e6, 2000 * size_of(path));
+}
+
+Status check_stated_size(const std::string& path, double width, double height, double bytes_a_pixel) {
     const bool is_possible =
         width >= 1 && height >= 1 && width <= 65535 && height <= 65535 && width * height <= 1 << 28;
-    if (is_possible && width * height * bytes_a_pixel <= std::max(packs_flat ? 64e6 : 0, 2000 * file)) return Done{};
+    if (is_possible && can_hold(path, width * height * bytes_a_pixel)) return Done{};
     return fail(fmt::format("'{}' says it is {:.0f} x {:.0f}: {}", path, width, height,
-                            is_possible ? fmt::format("{:.0f} bytes cannot hold that; it is damaged", file)
+                            is_possible ? fmt::format("{:.0f} bytes cannot hold that; it is damaged", size_of(path))
                                         : "larger than any picture that is read (65535 a side, 268 million pixels)"));
 }
 

@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "photographs/file_damage.hpp"
+#include "photographs/stated_size.hpp"
 
 namespace ols {
 
@@ -175,6 +176,9 @@ Status check_tiff_page(const std::string& path, int page) {
     const tmsize_t size = tiled ? TIFFTileSize(file.get()) : TIFFStripSize(file.get());
     const uint32_t blocks = tiled ? TIFFNumberOfTiles(file.get()) : TIFFNumberOfStrips(file.get());
     if (size <= 0) return damaged(path, complaints);
+    if (!can_hold(path, double(size)))  // a tile may be larger than its picture
+        return fail(
+            fmt::format("'{}' says that a tile takes {} bytes, which it cannot hold; it is damaged", path, size));
     std::vector<uint8_t> block(static_cast<size_t>(size));
     for (uint32_t i = 0; i < blocks; ++i) {
         const auto read = tiled ? TIFFReadEncodedTile(file.get(), i, block.data(), size)

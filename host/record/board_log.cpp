@@ -44,10 +44,7 @@ BoardLog::BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uin
       arrivals_(arrivals),
       why_stop_(std::move(why_stop)),
       on_news_(std::move(on_news)) {
-    thread_ = std::thread([this, on_end = std::move(on_end)] {
-        auto end = guarded("the board's log cannot be followed", [this] { return Result<LogEnd>(follow()); });
-        on_end(end ? std::move(*end) : LogEnd{end.error().message, true});
-    });
+    thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
 }
 
 BoardLog::~BoardLog() {
@@ -55,7 +52,8 @@ BoardLog::~BoardLog() {
 }
 
 LogEnd BoardLog::follow() {
-    LogEnd end = read_to_end();
+    auto read = guarded("the board's log cannot be followed", [this] { return Result<LogEnd>(read_to_end()); });
+    LogEnd end = read ? std::move(*read) : LogEnd{read.error().message, true};
     if (end.is_lost) board_.tell_to_stop();
     return end;
 }

@@ -14,7 +14,6 @@ namespace ols {
 
 namespace {
 
-constexpr double closest_lamps_rad = 1e-6;
 constexpr int octant_side = -1;
 
 // A convex spherical polygon, counter-clockwise from outside. The side that begins at a corner lies on the great circle

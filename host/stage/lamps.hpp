@@ -38,6 +38,9 @@ struct LightPosition {
     Vec3 direction;  // unit length
 };
 
+// Lamps that are closer stand in one direction: nobody can tell them apart, and their cells of the sphere would be empty.
+inline constexpr double closest_lamps_rad = 1e-6;
+
 // Directions named lamp_000 and so on; without any, those of stage_lamp_directions().
 std::vector<LightPosition> named_lamps(const std::vector<Vec3>& directions = stage_lamp_directions());
 

@@ -21,9 +21,6 @@ namespace {
 
 constexpr uintmax_t largest_text = 64 << 20;
 
-// As relight/sphere_cells.cpp has it: closer ones have no cells of their own.
-constexpr double closest_lamps_rad = 1e-6;
-
 std::optional<std::string> utf8_of(const std::string& bytes, const char* encoding) {
     const iconv_t converter = iconv_open("UTF-8", encoding);
     if (converter == iconv_t(-1)) return std::nullopt;
@@ -102,6 +99,7 @@ size_t numbers_behind_name(const NumberedName& words) {
 struct Light {
     LightPosition position;
     std::optional<std::array<double, 3>> intensity;
+    size_t columns = 3;  // of numbers
 };
 
 Result<Light> parse_light(const TextLine& line, const std::string& where) {
@@ -115,7 +113,7 @@ Result<Light> parse_light(const TextLine& line, const std::string& where) {
     if (!direction)
         return fail(where + ": '" + line.text + "' is no light: write `name x y z` with a direction that is not zero");
     const size_t begin = all[0].begin, end = all[all.size() - count - 1].end;
-    Light light{{line.text.substr(begin, end - begin), *direction}, std::nullopt};
+    Light light{{line.text.substr(begin, end - begin), *direction}, std::nullopt, count};
     if (count == 4) light.intensity = {v[3], v[3], v[3]};
     if (count == 6) light.intensity = {v[3], v[4], v[5]};
     if (light.intensity)
@@ -188,13 +186,14 @@ Result<LightFile> read_light_file(const std::string& path) {
         return fail(fmt::format("{}:{}: '{}' is not the number of lights an .lp file begins with", path,
                                 lines->front().number, lines->front().text));
     LightFile file;
+    size_t columns = 0;
     for (size_t i = 1; i < lines->size(); ++i) {
         const TextLine& line = (*lines)[i];
         const auto where = fmt::format("{}:{}", path, line.number);
         auto light = parse_light(line, where);
         if (!light) return light.error();
-        if (i > 1 && light->intensity.has_value() == file.intensities.empty())
-            return fail(where + ": has another number of columns than the lines before it");
+        if (i == 1) columns = light->columns;
+        if (light->columns != columns) return fail(where + ": has another number of columns than the lines before it");
         file.lights.push_back(light->position);
         file.lines.push_back(line.number);
         if (light->intensity) file.intensities.push_back(*light->intensity);

@@ -34,8 +34,13 @@ void add_ingest_verb(CLI::App& app, int& exit_code) {
     verb->callback([verb, &exit_code] {
         std::error_code error;
         const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-        become((self.parent_path() / "stagectl-ingest").string(), verb->remaining());
         exit_code = 1;
+        if (error) {
+            fmt::print(stderr, "stagectl ingest: cannot find the folder of stagectl ({}): mount /proc\n",
+                       error.message());
+            return;
+        }
+        become((self.parent_path() / "stagectl-ingest").string(), verb->remaining());
     });
 }
 

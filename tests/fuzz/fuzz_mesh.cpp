@@ -8,6 +8,7 @@
 #include <string>
 
 #include "scene/mesh.hpp"
+#include "words.hpp"
 
 namespace {
 
@@ -15,48 +16,39 @@ void expect(bool truth) {
     if (!truth) abort();
 }
 
-std::string with_words(const uint8_t* bytes, size_t size) {
-    static const std::array<const char*, 32> words = {
-        "v ",
-        "vn ",
-        "f ",
-        "\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
-        "\nf 1 2 3 4\n",
-        "1//1",
-        " -1",
-        "1e308",
-        "nan",
-        "\\\n",
-        "usemtl a\n",
-        "ply\nformat ascii 1.0\n",
-        "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n",
-        "element face 1\nproperty list uchar int vertex_indices\n",
-        "end_header\n",
-        "0 0 0 1 0 0 1 1 0 0 1 0 4 0 1 2 3",
-        "property uchar red\n",
-        "{\"asset\":{\"version\":\"2.0\"},",
-        "\"scenes\":[{\"nodes\":[0]}],",
-        "\"nodes\":[{\"mesh\":0}],",
-        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],",
-        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],",
-        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],",
-        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:a;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAA\"}]}",
-        "4294967296",
-        "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],",
-        "\"children\":[0],",
-        "\n",
-        " ",
-        "binary_little_endian",
-        "vn 0 0 0\n",
-        "/"};
-    std::string text;
-    for (size_t i = 0; i < size; ++i)
-        if (bytes[i] >= 0x80)
-            text += words[bytes[i] % words.size()];
-        else
-            text.push_back(char(bytes[i]));
-    return text;
-}
+constexpr std::array<const char*, 32> words = {
+    "v ",
+    "vn ",
+    "f ",
+    "\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
+    "\nf 1 2 3 4\n",
+    "1//1",
+    " -1",
+    "1e308",
+    "nan",
+    "\\\n",
+    "usemtl a\n",
+    "ply\nformat ascii 1.0\n",
+    "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n",
+    "element face 1\nproperty list uchar int vertex_indices\n",
+    "end_header\n",
+    "0 0 0 1 0 0 1 1 0 0 1 0 4 0 1 2 3",
+    "property uchar red\n",
+    "{\"asset\":{\"version\":\"2.0\"},",
+    "\"scenes\":[{\"nodes\":[0]}],",
+    "\"nodes\":[{\"mesh\":0}],",
+    "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],",
+    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],",
+    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],",
+    "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:a;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAA\"}]}",
+    "4294967296",
+    "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],",
+    "\"children\":[0],",
+    "\n",
+    " ",
+    "binary_little_endian",
+    "vn 0 0 0\n",
+    "/"};
 
 void check(const ols::Mesh& mesh) {
     expect(!mesh.triangles.empty());
@@ -73,7 +65,8 @@ void check(const ols::Mesh& mesh) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
     if (size == 0) return 0;
-    const std::string rest = bytes[0] % 2 == 0 ? std::string(bytes + 1, bytes + size) : with_words(bytes + 1, size - 1);
+    const std::string rest =
+        bytes[0] % 2 == 0 ? std::string(bytes + 1, bytes + size) : with_words({bytes + 1, size - 1}, words);
     const auto file = bytes[0] / 2 % 3 == 0   ? ols::parse_obj("fuzz.obj", rest)
                       : bytes[0] / 2 % 3 == 1 ? ols::parse_ply("fuzz.ply", rest)
                                               : ols::parse_gltf("/nonexistent/fuzz.gltf", rest);

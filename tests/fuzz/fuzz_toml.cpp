@@ -13,6 +13,7 @@
 
 #include "stage/sequence.hpp"
 #include "stage/stage.hpp"
+#include "words.hpp"
 
 namespace {
 
@@ -20,48 +21,39 @@ void expect(bool truth) {
     if (!truth) abort();
 }
 
-// Bytes of 0x80 and above stand for a word of ours.
-std::string with_words(const uint8_t* bytes, size_t size) {
-    static const std::array<const char*, 32> words = {"[lamps]\n",
-                                                      "[chain]\n",
-                                                      "[[camera]]\n",
-                                                      "[[lamps.matte]]\n",
-                                                      "[[slot]]\n",
-                                                      "[[trigger]]\n",
-                                                      "position_m = ",
-                                                      "look_at_m = ",
-                                                      "up = ",
-                                                      "width = ",
-                                                      "height = ",
-                                                      "radius_m = ",
-                                                      "bits = ",
-                                                      "bit_of_lamp = ",
-                                                      "frequency_hz = ",
-                                                      "1e308",
-                                                      "nan",
-                                                      "-inf",
-                                                      "9223372036854775807",
-                                                      "[0, 0, 1]",
-                                                      "[1e6, 0, -1]",
-                                                      "white = ",
-                                                      "black = ",
-                                                      "lamps = ",
-                                                      "levels = ",
-                                                      "= [{",
-                                                      "{a = ",
-                                                      "\n",
-                                                      "vertical_fov_deg = ",
-                                                      "basis = ",
-                                                      "exposure_us = ",
-                                                      "\"\"\""};
-    std::string text;
-    for (size_t i = 0; i < size; ++i)
-        if (bytes[i] >= 0x80)
-            text += words[bytes[i] % words.size()];
-        else
-            text.push_back(char(bytes[i]));
-    return text;
-}
+// What bytes of 0x80 and above stand for.
+constexpr std::array<const char*, 32> words = {"[lamps]\n",
+                                               "[chain]\n",
+                                               "[[camera]]\n",
+                                               "[[lamps.matte]]\n",
+                                               "[[slot]]\n",
+                                               "[[trigger]]\n",
+                                               "position_m = ",
+                                               "look_at_m = ",
+                                               "up = ",
+                                               "width = ",
+                                               "height = ",
+                                               "radius_m = ",
+                                               "bits = ",
+                                               "bit_of_lamp = ",
+                                               "frequency_hz = ",
+                                               "1e308",
+                                               "nan",
+                                               "-inf",
+                                               "9223372036854775807",
+                                               "[0, 0, 1]",
+                                               "[1e6, 0, -1]",
+                                               "white = ",
+                                               "black = ",
+                                               "lamps = ",
+                                               "levels = ",
+                                               "= [{",
+                                               "{a = ",
+                                               "\n",
+                                               "vertical_fov_deg = ",
+                                               "basis = ",
+                                               "exposure_us = ",
+                                               "\"\"\""};
 
 void check_camera(const ols::CameraConfig& camera) {
     double view = 0, up = 0, across = 0;
@@ -83,7 +75,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* bytes, size_t size) {
     static const std::string path =
         std::filesystem::temp_directory_path() / ("fuzz_toml_" + std::to_string(getpid()) + ".toml");
     if (size == 0) return 0;
-    const std::string text = bytes[0] % 2 == 0 ? std::string(bytes + 1, bytes + size) : with_words(bytes + 1, size - 1);
+    const std::string text =
+        bytes[0] % 2 == 0 ? std::string(bytes + 1, bytes + size) : with_words({bytes + 1, size - 1}, words);
     std::ofstream(path, std::ios::binary) << text;
     if (bytes[0] % 4 < 2) {
         const auto stage = ols::read_stage(path);

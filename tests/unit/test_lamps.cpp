@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "stage/lamps.hpp"
+#include "stage/light_file.hpp"
 
 using namespace ols;
 
@@ -87,6 +88,10 @@ TEST(LightPositions, a_round_trip_keeps_directions_to_a_nanoradian) {
 TEST(LightPositions, a_wrong_count_a_zero_vector_and_prose_are_errors_that_name_the_line) {
     EXPECT_NE(read_lp(write_file("3\na 0 0 1\n")).error().message.find("says 3 lights and lists 1"), std::string::npos);
     EXPECT_NE(read_lp(write_file("1\na 0 0 0\n")).error().message.find(":2:"), std::string::npos);
+    EXPECT_NE(read_light_file(write_file("2\na.png 0 0 1 2\nb.png 0 1 0 2 4 8\n"))
+                  .error()
+                  .message.find(":3: has another number"),
+              std::string::npos);
     EXPECT_NE(read_lp(write_file("hello\n")).error().message.find(":1:"), std::string::npos);
     EXPECT_NE(read_lp(write_file("1\na 0 0 nan\n")).error().message.find(":2:"), std::string::npos);
     EXPECT_FALSE(read_lp(write_file("")).ok());

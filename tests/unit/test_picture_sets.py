@@ -48,6 +48,29 @@ def test_lights_that_cannot_be_are_named_at_ingest(folder, lines, word):
     assert word in refusal and "lights.lp:3" in refusal
 
 
+def test_a_link_that_leads_nowhere_in_the_folder_harms_nothing(folder):
+    folder.add("a.png", png(CODES16))
+    folder.lights.write_text("1\nA.png 0 0 1\n")
+    for i in range(20):
+        (folder.path / f"{i}.png").symlink_to("none")
+    near(folder.light()[0], SRGB16)
+
+
+def test_intensities_all_have_names_or_none_has_and_a_path_tells_pictures_of_one_name_apart(folder, tmp_path):
+    for name in ("x", "y"):
+        (folder.path / name).mkdir()
+        folder.add(f"{name}/1.png", png(CODES16))
+    folder.lights.write_text("2\nx/1.png 0 0 1\ny/1.png 0 1 1\n")
+    (tmp_path / "i.txt").write_text("y/1.png 4\nx/1.png 2\n")
+    light = folder.light("--intensities", tmp_path / "i.txt")
+    near(light[0], SRGB16 / 2)
+    near(light[1], SRGB16 / 4)
+    for text, line in (("2\ny/1.png 4\n", 2), ("y/1.png 4\n2\n", 2)):
+        (tmp_path / "i.txt").write_text(text)
+        done = folder.run("--intensities", tmp_path / "i.txt")
+        assert done.returncode == 1 and f"i.txt:{line}: some lines have names and others none" in done.stderr
+
+
 # --- masks ---
 
 def outside(folder):

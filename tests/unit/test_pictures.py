@@ -11,7 +11,7 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms, ImageOps
 
-from exr_bytes import exr
+from exr_bytes import chromaticities, exr
 from picture_files import bmp, png, tga, write_dng
 from picture_folder import ALPHA8, CODES8, CODES16, GENERATOR, GREY8, GREY16, HEIGHT, SRGB8, SRGB16, WIDTH, folder, linear_of, near
 
@@ -362,3 +362,70 @@ def test_intensities_that_do_not_fit_are_refused_by_line(folder, text, word, tmp
         folder.add(name, png(CODES16))
     (tmp_path / "i.txt").write_text(text)
     assert word in folder.refusal("--intensities", tmp_path / "i.txt")
+
+
+def palette_tiff(bits, indices, colors):
+    """One strip of packed indices and a ColorMap of 16-bit R, then G, then B (TIFF 6.0, section 5)."""
+    height, width = indices.shape
+    rows = np.packbits(((indices[:, :, None] >> np.arange(bits - 1, -1, -1)) & 1).reshape(height, -1).astype(np.uint8), axis=1)
+    data, table = rows.tobytes(), (colors.astype(np.uint16) * 257).T.tobytes()
+    tags = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, bits), (259, 3, 1, 1), (262, 3, 1, 3), (273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, height),
+            (279, 4, 1, len(data)), (320, 3, 3 * 2**bits, 8 + len(data))]
+    head = struct.pack("<2sHI", b"II", 42, 8 + len(data) + len(table))
+    return head + data + table + struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags) + bytes(4)
+
+
+@pytest.mark.parametrize("bits", [1, 4, 8])
+def test_a_palette_is_read_through_its_colours(folder, bits):
+    indices = GENERATOR.integers(0, 2**bits, (HEIGHT, WIDTH)).astype(np.uint8)
+    colors = GENERATOR.integers(0, 256, (2**bits, 3))
+    folder.add("a.tif", palette_tiff(bits, indices, colors))
+    truth = linear_of(colors[indices] / 255)
+    assert np.array_equal(np.asarray(Image.open(folder.path / "a.tif").convert("RGB")), colors[indices])
+    near(folder.light()[0], truth)
+
+
+@pytest.mark.parametrize("grey, type", [(GREY16, np.uint16), (GREY8, np.uint8)])
+def test_white_is_zero_and_alpha_has_no_white(folder, grey, type):
+    last = np.iinfo(type).max
+    alpha = np.zeros((HEIGHT, WIDTH), type)
+    alpha[3:9, 4:20] = last
+    for name, photometric in (("m.tif", "miniswhite"), ("n.tif", "minisblack")):
+        tifffile.imwrite(folder.path.parent / name, np.dstack([grey, alpha]), photometric=photometric, extrasamples=["unassalpha"], planarconfig="contig", metadata=None)
+    folder.add("a.png", CODES8)
+    masks = []
+    for name in ("m.tif", "n.tif"):
+        folder.light("--mask", folder.path.parent / name)
+        masks.append(OpenEXR.File(str(folder.archive / "cam0/target_000000.exr"), separate_channels=True).parts[1].channels["Y"].pixels.copy())
+    assert np.array_equal(masks[0], masks[1]) and (masks[0] > 0).sum() == HEIGHT * WIDTH - 96
+    tifffile.imwrite(folder.path / "a.png", np.dstack([grey, alpha]), photometric="miniswhite", extrasamples=["unassalpha"], planarconfig="contig", metadata=None)
+    near(folder.light()[0], linear_of((last - grey.astype(int)) / last))
+
+
+def test_a_flat_picture_may_be_packed_tightly_and_a_tile_of_gigabytes_not(folder):
+    disc = np.hypot(*np.mgrid[-1000:1000, -1000:1000]) < 800
+    Image.fromarray(disc).save(folder.path / "a.tif", compression="group4")
+    assert (folder.path / "a.tif").stat().st_size < 2000  # of 4 MB
+    near(folder.light()[0], disc * 1.0)
+    tifffile.imwrite(folder.path / "a.tif", CODES8, photometric="rgb", tile=(16, 16), metadata=None)
+    file = bytearray((folder.path / "a.tif").read_bytes())
+    for tag in (322, 323):
+        at = file.index(struct.pack("<H", tag))
+        file[at:at + 12] = struct.pack("<HHII", tag, 4, 1, 32768)
+    (folder.path / "a.tif").write_bytes(file)
+    done = folder.run()
+    assert done.returncode == 1 and "a.tif' says that a tile takes" in done.stderr
+
+
+def test_primaries_of_openexr_are_of_light_and_not_of_codes(folder):
+    codes = {name: (CODES8[..., c] / 255).astype(np.float32) for c, name in enumerate("RGB")}
+    wide = chromaticities(0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290)
+    (folder.path / "a.exr").write_bytes(exr(codes, extra=[wide]))
+    as_file = folder.light()[0]
+    assert "converted" in folder.said()
+    near(folder.light("--transfer", "linear")[0], as_file)
+    near(folder.light("--transfer", "srgb")[0], SRGB8)
+    assert "its primaries are left out" in folder.said() and "lin_rec709_scene" not in (folder.archive / "manifest.json").read_text()
+    (folder.path / "a.exr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 4\n" + bytes(16))
+    done = folder.run("--transfer", "srgb")
+    assert done.returncode == 1 and "leave out --transfer srgb" in done.stderr

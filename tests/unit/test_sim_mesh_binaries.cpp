@@ -3,36 +3,24 @@
 // links: ols_stagesim
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 
 #include "scene/mesh.hpp"
+#include "scratch_folder.hpp"
 
 using namespace ols;
 
 namespace {
 
-class MeshBinaries : public testing::Test {
+class MeshBinaries : public ScratchFolder {
   protected:
-    MeshBinaries() { std::filesystem::create_directories(folder_); }
-    ~MeshBinaries() override { std::filesystem::remove_all(folder_); }
-
-    std::string write(const std::string& name, const std::string& bytes) {
-        std::ofstream(folder_ / name, std::ios::binary) << bytes;
-        return folder_ / name;
-    }
     std::string refusal(const std::string& name, const std::string& bytes) {
         const auto mesh = read_mesh(write(name, bytes));
         return mesh ? "was read" : mesh.error().message;
     }
-
-    const std::filesystem::path folder_ =
-        std::filesystem::temp_directory_path() / ("mesh_binaries" + std::to_string(getpid()));
 };
 
 bool contains(const std::string& text, const std::string& what) {

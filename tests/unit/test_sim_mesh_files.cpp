@@ -4,29 +4,21 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 
 #include "scene/mesh.hpp"
+#include "scratch_folder.hpp"
 
 using namespace ols;
 
 namespace {
 
-class MeshFiles : public testing::Test {
+class MeshFiles : public ScratchFolder {
   protected:
-    MeshFiles() { std::filesystem::create_directories(folder_); }
-    ~MeshFiles() override { std::filesystem::remove_all(folder_); }
-
-    std::string write(const std::string& name, const std::string& bytes) {
-        std::ofstream(folder_ / name, std::ios::binary) << bytes;
-        return folder_ / name;
-    }
     Result<Mesh> read(const std::string& text, const MeshPlacement& placement = {}) {
         return read_mesh(write("mesh.obj", text), placement);
     }
@@ -34,9 +26,6 @@ class MeshFiles : public testing::Test {
         const auto mesh = read(text);
         return mesh ? "was read" : mesh.error().message;
     }
-
-    const std::filesystem::path folder_ =
-        std::filesystem::temp_directory_path() / ("meshes" + std::to_string(getpid()));
 };
 
 // Against +z: a triangle that is turned over counts against the others.

@@ -5,27 +5,19 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
 #include <limits>
 
+#include "scratch_folder.hpp"
 #include "stage/toml_outline.hpp"
 
 using namespace ols;
 
 namespace {
 
-class TomlFile : public testing::Test {
+class TomlFile : public ScratchFolder {
   protected:
-    TomlFile() { std::filesystem::create_directories(folder_); }
-    ~TomlFile() override { std::filesystem::remove_all(folder_); }
-
-    std::string write(const std::string& text) {
-        std::ofstream(folder_ / "a.toml", std::ios::binary) << text;
-        return folder_ / "a.toml";
-    }
+    std::string write(const std::string& text) { return ScratchFolder::write("a.toml", text); }
     std::string opening(const std::string& text) {
         const auto file = TomlSection::open(write(text));
         return file ? "opened" : file.error().message;
@@ -39,8 +31,6 @@ class TomlFile : public testing::Test {
         const Status status = file->finish();
         return status ? "" : status.error().message;
     }
-
-    const std::filesystem::path folder_ = std::filesystem::temp_directory_path() / ("toml" + std::to_string(getpid()));
 };
 
 bool contains(const std::string& text, const std::string& what) {

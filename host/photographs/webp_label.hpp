@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What WebP files say of their colours and their orientation, which OpenImageIO 2.4 does not hand on; and codes of colours.
+// What WebP files say of their colours and their orientation, which OpenImageIO 2.4 does not hand on.
 #pragma once
 
 #include <string>
@@ -17,8 +17,5 @@ struct WebpLabel {
 
 // ICCP and EXIF chunks of a WebP file (RFC 9649, 2.7.1). Errors: damaged.
 Result<WebpLabel> read_webp_label(const std::string& path);
-
-// Colour codes of ITU-T H.273 as a label. Errors (without the file's name): a transfer for displays, primaries of another kind.
-Result<ColorLabel> label_of_codes(int primaries, int transfer, const std::string& name);
 
 }  // namespace ols
