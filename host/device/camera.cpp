@@ -6,6 +6,7 @@
 
 #include "device/fake_camera.hpp"
 #include "device/ring_camera.hpp"
+#include "device/v4l2_camera.hpp"
 
 namespace ols {
 
@@ -52,15 +53,24 @@ Status check_setup(const std::string& camera, const CameraSetup& wanted, const C
     compare("exposure_mode", wanted.exposure_mode, accepted.exposure_mode);
     if (wanted.exposure_mode == ExposureMode::timed && accepted.exposure_mode == ExposureMode::timed)
         compare("exposure_us", wanted.exposure_us, accepted.exposure_us);
+    for (const auto& [name, value] : wanted.controls) {
+        const auto control = accepted.controls.find(name);
+        if (control == accepted.controls.end())
+            problems += fmt::format("{}it has no control \"{}\"", problems.empty() ? "" : "; ", name);
+        else
+            compare(("control " + text_of(name)).c_str(), value, control->second);
+    }
     if (problems.empty()) return Done{};
     return fail(camera + " is not as the stage's [[camera]] says: " + problems);
 }
 
 Result<std::unique_ptr<Camera>> open_camera(const std::string& source, uint32_t index) {
-    constexpr std::string_view ring_scheme = "ring:", fake_scheme = "fake:";
+    constexpr std::string_view ring_scheme = "ring:", fake_scheme = "fake:", v4l2_scheme = "v4l2:";
     if (source.starts_with(ring_scheme)) return open_ring_camera(source.substr(ring_scheme.size()), index);
     if (source.starts_with(fake_scheme)) return open_fake_camera(source.substr(fake_scheme.size()), index);
-    return fail("'" + source + "' is no camera: write ring:PATH, or fake:RATE for one without hardware");
+    if (source.starts_with(v4l2_scheme)) return open_v4l2_camera(source.substr(v4l2_scheme.size()), index);
+    return fail("'" + source +
+                "' is no camera: write v4l2:/dev/video0, ring:PATH, or fake:RATE for one without hardware");
 }
 
 }  // namespace ols

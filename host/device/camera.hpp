@@ -82,7 +82,7 @@ class Camera {
 };
 
 // "ring:PATH" is a shared-memory ring that another program fills (device/ring.hpp), as the virtual stage does;
-// "fake:RATE" a camera without hardware (device/fake_camera.hpp). Frames are marked as camera `index`'s.
+// "v4l2:/dev/video0" one of the kernel's (device/v4l2_camera.hpp); "fake:RATE" one without hardware (device/fake_camera.hpp). Frames are marked as camera `index`'s.
 Result<std::unique_ptr<Camera>> open_camera(const std::string& source, uint32_t index = 0);
 
 // What set_up returns: Done when `accepted`, read back from the device, is what was wanted; otherwise an error that names

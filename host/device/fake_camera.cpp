@@ -44,6 +44,7 @@ Status FakeCamera::set_up(const CameraSetup& wanted) {
     const std::lock_guard lock(mutex_);
     // As a device does: it takes what it can and keeps what it has, and then says what it took.
     CameraSetup accepted = wanted;
+    accepted.controls.clear();  // it has none
     accepted.width = std::clamp(wanted.width, 8, 4096);
     accepted.height = std::clamp(wanted.height, 8, 4096);
     const CameraSetup own;

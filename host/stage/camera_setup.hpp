@@ -2,6 +2,7 @@
 // How a camera is to be set up for a take: what a driver asks of the device, and reads back.
 #pragma once
 
+#include <map>
 #include <string>
 
 #include "image/frame.hpp"
@@ -22,7 +23,8 @@ struct CameraSetup {
     TriggerActivation trigger_activation = TriggerActivation::rising_edge;
     double trigger_delay_us = 0;  // from the edge to the begin of the exposure
     ExposureMode exposure_mode = ExposureMode::trigger_width;
-    double exposure_us = 100;  // of ExposureMode::timed
+    double exposure_us = 100;                     // of ExposureMode::timed
+    std::map<std::string, std::string> controls;  // settings of the device's own, by its names for them: "Gain" is "12"
 };
 
 }  // namespace ols

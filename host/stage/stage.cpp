@@ -142,6 +142,7 @@ CameraConfig read_camera(TomlSection& camera) {
     camera.read_choice<ExposureMode>("exposure_mode", config.exposure_mode,
                                      {{"trigger_width", ExposureMode::trigger_width}, {"timed", ExposureMode::timed}});
     camera.read("exposure_us", config.exposure_us, 0.1, 1e6);
+    camera.read("controls", config.controls);
     read_view(camera, config);
     camera.read("vignetting", config.vignetting, 0, 1);
     camera.read("counts_per_us", config.counts_per_us, 1e-6, 1e6);

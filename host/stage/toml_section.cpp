@@ -245,6 +245,29 @@ void TomlSection::read(const std::string& key, std::array<double, 3>& value, dou
     std::copy(numbers->begin(), numbers->end(), value.begin());
 }
 
+static std::optional<std::string> text_of(const toml::node& node) {
+    if (const auto flag = node.value_exact<bool>()) return *flag ? "true" : "false";
+    if (const auto whole = node.value_exact<int64_t>()) return fmt::format("{}", *whole);
+    if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
+    auto text = node.value_exact<std::string>();
+    return text && is_plain(*text) ? text : std::nullopt;
+}
+
+void TomlSection::read(const std::string& key, std::map<std::string, std::string>& value) {
+    const toml::node* node = as_node(find(key));
+    if (!node) return;
+    const toml::table* table = node->as_table();
+    if (!table || table->size() > list_entries_max)
+        return reject(key, "must be a table of settings by their names: { \"Gain\" = 12 }");
+    for (const auto& [name, entry] : *table) {
+        file_->read.insert(&entry);
+        const auto text = text_of(entry);
+        if (!text || !is_plain(std::string(name.str())))
+            return reject(key, fmt::format("must give \"{}\" one text, number, true or false", name.str()));
+        value[std::string(name.str())] = *text;
+    }
+}
+
 void TomlSection::read_direction(const std::string& key, std::array<double, 3>& value) {
     std::array<double, 3> read_value = value;
     read(key, read_value, -direction_max, direction_max);

@@ -33,6 +33,9 @@ class TomlSection {
     void read(const std::string& key, std::vector<std::string>& value);
     void read(const std::string& key, std::array<double, 3>& value, double min, double max);
 
+    // A table of settings by names that are not ours, each a text, a number, true or false, as text.
+    void read(const std::string& key, std::map<std::string, std::string>& value);
+
     // A vector of any length but zero.
     void read_direction(const std::string& key, std::array<double, 3>& value);
 
