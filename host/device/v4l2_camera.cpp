@@ -184,7 +184,6 @@ class V4l2Camera : public Camera {
     Taken frame_of(const V4l2Stream::Filled& filled, V4l2Stamp stamp) {
         const bool is_end = !stamp.is_begin && made_.setup.exposure_mode == ExposureMode::timed;
         const CameraStamp ours{stamp.id, stamp.time_ns - std::min(stamp.time_ns, is_end ? exposure_ns() : 0)};
-        if (!delivery_.take(ours)) return std::nullopt;
         Frame frame;
         frame.camera = index_;
         frame.stamp = ours;
@@ -198,9 +197,11 @@ class V4l2Camera : public Camera {
         const std::span<uint16_t> to(reinterpret_cast<uint16_t*>(frame.samples.data()), row_samples * frame.height);
         const Status whole =
             unpack_samples(filled.content, made_.layout, row_samples, frame.height, made_.row_bytes, to);
-        if (whole.ok() && !is_overwritten(filled.buffer)) return frame;
-        ++(whole.ok() ? overwritten_ : underrun_);
-        return std::nullopt;
+        if (!whole.ok() || is_overwritten(filled.buffer)) {
+            ++(whole.ok() ? overwritten_ : underrun_);
+            return std::nullopt;
+        }
+        return delivery_.take(ours) ? Taken(std::move(frame)) : std::nullopt;
     }
 
     // v4l2loopback 0.12 goes on writing into what is being read. The next round begins with this buffer once the one before it has

@@ -58,7 +58,7 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
         "--board", board,
         "the board, usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera)
-        verb.add_option("--camera", camera, "the camera, ring:PATH or fake:RATE; otherwise stage.toml's camera source");
+        verb.add_option("--camera", camera, "the camera, v4l2:/dev/video0, ring:PATH or fake:RATE; otherwise stage.toml's camera source");
     verb.add_option("--wait", wait_s,
                     "seconds to wait for what is not there yet, as a virtual stage that still renders")
         ->check(CLI::NonNegativeNumber);

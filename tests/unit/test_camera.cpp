@@ -50,7 +50,8 @@ std::string error_of(const Result<std::unique_ptr<Camera>>& opened) {
 
 TEST(OpenCamera, an_unknown_scheme_is_answered_with_those_there_are) {
     const std::string message = error_of(open_camera("usb3:0"));
-    EXPECT_NE(message.find("ring:PATH"), std::string::npos) << message;
+    for (const char* kind : {"v4l2:/dev/video0", "ring:PATH"})
+        EXPECT_NE(message.find(kind), std::string::npos) << message;
     EXPECT_NE(message.find("fake:RATE"), std::string::npos) << message;
 }
 
@@ -76,6 +77,18 @@ TEST(CheckSetup, names_every_key_that_differs_and_those_that_a_camera_does_not_h
         refused.error().message,
         "camera X is not as the stage's [[camera]] says: cfa is rggb and not none; bits is 12 and not 10; it has no "
         "exposure_mode, leave it out");
+}
+
+TEST(CheckSetup, names_controls_that_differ_and_those_that_a_camera_does_not_have) {
+    CameraSetup wanted, accepted;
+    wanted.controls = {{"Gain", "12"}, {"Gamma", "1"}, {"Trigger Mode", "1"}};
+    accepted.controls = {{"Gain", "10"}, {"Gamma", "1"}};
+    EXPECT_EQ(
+        check_setup("camera X", wanted, accepted).error().message,
+        "camera X is not as the stage's [[camera]] says: control \"Gain\" is \"10\" and not \"12\"; it has no control "
+        "\"Trigger Mode\"");
+    FakeCamera fake(FakeOptions{});
+    EXPECT_NE(fake.set_up(wanted).error().message.find("it has no control \"Gain\""), std::string::npos);
 }
 
 TEST(DeliveryCount, a_gap_counts_its_ids_and_late_frames_and_duplicates_are_none_of_them) {

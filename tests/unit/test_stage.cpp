@@ -82,6 +82,23 @@ TEST_F(StageFile, says_how_a_camera_is_triggered_and_exposed) {
     EXPECT_NE(error_of("[[camera]]\nexposure_mode = \"auto\"\n").find("none of: "), std::string::npos);
 }
 
+TEST_F(StageFile, takes_a_cameras_own_settings_by_the_cameras_own_names) {
+    const auto stage = read_stage(write("stage.toml",
+                                        "[[camera]]\ncontrols = { \"Trigger Mode\" = 1, gain_automatic = false, "
+                                        "Mode = \"50 Hz\", rate = 2.5 }\n"
+                                        "[[camera]]\n[camera.controls]\nGain = -3\n"));
+    ASSERT_TRUE(stage.ok()) << stage.error().message;
+    using Controls = std::map<std::string, std::string>;
+    EXPECT_EQ(stage->cameras[0].controls,
+              (Controls{{"Trigger Mode", "1"}, {"gain_automatic", "false"}, {"Mode", "50 Hz"}, {"rate", "2.5"}}));
+    EXPECT_EQ(stage->cameras[1].controls, (Controls{{"Gain", "-3"}}));
+    EXPECT_NE(error_of("[[camera]]\ncontrols = \"Gain\"\n").find("camera.controls must be a table of settings"),
+              std::string::npos);
+    EXPECT_NE(
+        error_of("[[camera]]\n\ncontrols = { Gain = [1, 2] }\n").find(":3: camera.controls must give \"Gain\" one"),
+        std::string::npos);
+}
+
 TEST_F(StageFile, white_follows_the_bits_of_the_camera) {
     const auto stage = read_stage(write("stage.toml", "[[camera]]\nbits = 10\n"));
     ASSERT_TRUE(stage.ok());

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""Feeds a v4l2loopback device by write(), as an mmap writer leaves `sequence` 0: frames from standard input, or numbered ones.
+
+usage: feed_loopback.py DEVICE FOURCC WIDTH HEIGHT BYTES [COUNT RATE_HZ]
+BYTES is a sample's. A numbered frame has its number, from 0, in its first and last sample. Says "ready" once the device has its
+format, waits for a line of standard input if frames are to be numbered, and at the end says how many it has written.
+"""
+import fcntl
+import os
+import struct
+import sys
+import time
+
+VIDIOC_S_FMT, OUTPUT, FIELD_NONE = 0xC0D05605, 2, 1  # videodev2.h
+
+
+def main():
+    device, fourcc, *numbers = sys.argv[1:]
+    width, height, sample_bytes = map(int, numbers[:3])
+    size = width * height * sample_bytes
+    fd = os.open(device, os.O_RDWR)
+    pix = struct.pack("<II4sIIIIIIIIII", width, height, fourcc.encode(), FIELD_NONE, width * sample_bytes, size, 8, *[0] * 6)
+    taken = bytearray(struct.pack("<I4x", OUTPUT) + pix.ljust(200, b"\0"))
+    fcntl.ioctl(fd, VIDIOC_S_FMT, taken)
+    got = struct.unpack_from("<II4s", taken, 8)
+    if got != (width, height, fourcc.encode()):
+        sys.exit(f"the device took {got}")
+    os.write(fd, bytes(size))  # a first frame: until then nobody may set the device up to read
+    print("ready", flush=True)
+    written = 1
+    if len(numbers) > 3:
+        count, rate_hz = int(numbers[3]), float(numbers[4])
+        sys.stdin.readline()
+        begin = time.monotonic()
+        for number in range(count):
+            time.sleep(max(0.0, begin + number / rate_hz - time.monotonic()))
+            mark = number.to_bytes(sample_bytes, "little")
+            written += os.write(fd, mark + bytes(size - 2 * sample_bytes) + mark) == size
+    else:
+        while len(frame := sys.stdin.buffer.read(size)) == size:
+            written += os.write(fd, frame) == size
+    print(f"written {written}", flush=True)
+    sys.stdin.read()  # the format goes with the last who has the device open
+
+
+main()
