@@ -75,8 +75,8 @@ struct Delivery {
 struct Take {
     std::vector<Delivery> frames;  // frames[n] is trigger n's, in order of delivery
     std::vector<ols_trigger_log_entry> log;
-    std::string log_end;     // why the log stopped early
-    std::string frames_end;  // why frames did
+    Reason log_end;     // why the log stopped early
+    Reason frames_end;  // why frames did
     size_t triggers = 0;
 };
 
@@ -101,12 +101,13 @@ struct Outcome {
     std::set<uint64_t> missing;
     std::map<uint64_t, MissingSlot> notes;
     int mislabelled = 0, duplicates = 0;
+    CauseCounts discarded;
     bool accounted = true;  // one verdict for each frame and each trigger
 };
 
 // Plays a take: the log is asked for every `poll` frames, `lag` triggers behind the camera.
 Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_t lag = 0,
-             const IdentifyOptions& options = {}, bool board_is_ahead = false) {
+             const IdentifyOptions& options = {}, bool board_is_ahead = false, uint64_t host_drops = 0) {
     Identifier identifier(sequence, options);
     Outcome outcome;
     std::set<uint64_t> frames_seen, triggers_seen;
@@ -121,7 +122,8 @@ Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_
                 outcome.missing.insert(verdict.slot.counter);
                 outcome.notes[verdict.slot.counter] = verdict.slot;
             } else {
-                outcome.duplicates += verdict.why.starts_with("duplicate");
+                outcome.discarded.add(verdict.why.cause);
+                outcome.duplicates += verdict.why.text.starts_with("duplicate");
             }
         }
     };
@@ -143,7 +145,7 @@ Outcome play(const Take& take, const Sequence& sequence, size_t poll = 13, size_
     }
     tell_log(take.triggers, take.frames.size());
     identifier.end_log(take.log_end);
-    identifier.end_frames(take.frames_end);
+    identifier.end_frames(take.frames_end, 0, host_drops);
     collect();
     outcome.accounted &= frames_seen.size() == take.frames.size() && triggers_seen.size() == take.triggers;
     return outcome;
@@ -226,7 +228,7 @@ const Fault faults[] = {
      },
      only_it},
     {"swapped", [](Take& t, uint64_t n) { std::swap(t.frames[n], t.frames[n + 1]); }, nothing},
-    {"wrong size", [](Take& t, uint64_t n) { t.frames[n].witness.unfit = "its size"; }, only_it},
+    {"wrong size", [](Take& t, uint64_t n) { t.frames[n].witness.unfit = {Cause::wrong_size, "its size"}; }, only_it},
     {"bad timestamp", [](Take& t, uint64_t n) { t.frames[n].witness.stamp.timestamp_ns += 150'000; }, only_it},
     {"log entry lost", [](Take& t, uint64_t n) { t.log.erase(t.log.begin() + ptrdiff_t(n)); }, only_it},
     {"log entry of another slot", [](Take& t, uint64_t n) { ++t.log[n].slot; }, only_it},
@@ -244,7 +246,7 @@ const Fault faults[] = {
      [](Take& t, uint64_t n) {
          t.frames.resize(n);
          t.log.resize(n);
-         t.log_end = "the board was reset";
+         t.log_end = {Cause::board_gone, "the board was reset"};
      },
      [](const Sequence& s, uint64_t n) { return range(can_stand_alone(s, n) ? n : 0, s.trigger_count()); }},
     // Stamps go on and pixels come one frame late: only the optical code can tell, and only at landmarks.
@@ -294,14 +296,14 @@ TEST(Identify, a_camera_that_is_gone_is_why_its_later_frames_are_missing_and_not
     const uint64_t last = find_slot(stage.sequence, SlotKind::tracking, 2, 4);
     take.frames.resize(last + 1);
     take.frames.erase(take.frames.begin() + ptrdiff_t(lost));
-    take.frames_end = "the camera is gone";
+    take.frames_end = {Cause::camera_gone, "the camera is gone"};
     const Outcome outcome = play(take, stage.sequence);
     auto expected = range(last + 1, take.triggers);
     expected.insert(lost);
     EXPECT_EQ(outcome.missing, expected);
-    EXPECT_EQ(outcome.notes.at(last + 1).why, "the camera is gone");
-    EXPECT_EQ(outcome.notes.at(take.triggers - 1).why, "the camera is gone");
-    EXPECT_NE(outcome.notes.at(lost).why, "the camera is gone");
+    EXPECT_EQ(outcome.notes.at(last + 1).why, take.frames_end);
+    EXPECT_EQ(outcome.notes.at(take.triggers - 1).why, take.frames_end);
+    EXPECT_EQ(outcome.notes.at(lost).why.cause, Cause::link_lost_it);
 }
 
 TEST(Identify, an_unfit_frame_costs_its_own_slot_whatever_it_looks_like) {
@@ -313,14 +315,66 @@ TEST(Identify, an_unfit_frame_costs_its_own_slot_whatever_it_looks_like) {
         while (slots[slot].kind != kind) ++slot;
         const size_t trigger = slots.size() + slot;
         Take take = clean;
-        take.frames[trigger].witness.unfit = "stale";
+        take.frames[trigger].witness.unfit = {Cause::stale, "stale"};
         take.frames[trigger].witness.summary = take.frames[trigger - 1].witness.summary;
         const Outcome outcome = play(take, stage.sequence);
         EXPECT_EQ(outcome.missing, std::set<uint64_t>{trigger}) << slot_kind_name(kind);
-        EXPECT_EQ(outcome.notes.at(trigger).why, "stale");
+        EXPECT_EQ(outcome.notes.at(trigger).why.cause, Cause::stale);
         EXPECT_TRUE(outcome.notes.at(trigger).board && outcome.notes.at(trigger).camera && outcome.accounted);
         EXPECT_EQ(outcome.mislabelled, 0);
     }
+}
+
+// Causes that only all of a gap's facts tell: how many triggers, how many ids, and how many of them we dropped.
+TEST(Identify, a_gap_is_split_into_what_the_camera_missed_what_the_link_lost_and_what_we_dropped) {
+    SyntheticStage stage("single", 3);
+    Take take = record(stage);
+    const auto causes = [&](const Outcome& outcome) {
+        CauseCounts counts;
+        for (const auto& [trigger, note] : outcome.notes) counts.add(note.why.cause);
+        return counts.to_json();
+    };
+    const auto drop = [&](size_t first, size_t count) {
+        take.frames.erase(take.frames.begin() + ptrdiff_t(first), take.frames.begin() + ptrdiff_t(first + count));
+    };
+    const auto shift_ids = [&](size_t from, uint64_t by) {
+        for (size_t n = from; n < take.frames.size(); ++n) take.frames[n].witness.stamp.frame_id -= by;
+    };
+    // Seven triggers without a frame: the camera saw five of them, of which we dropped three, one while the disk was late. That we
+    // did is known two frames before the gap comes up, as it is when frames wait to be read.
+    drop(250, 7);
+    shift_ids(250, 2);
+    for (size_t n = 248; n < take.frames.size(); ++n) take.frames[n].witness.disk_drops = 1, take.frames[n].witness.host_drops = 2;
+    EXPECT_EQ(causes(play(take, stage.sequence)), (nlohmann::json{{"disk_was_late", 1},
+                                                                  {"host_was_late", 2},
+                                                                  {"link_lost_it", 2},
+                                                                  {"camera_missed_trigger", 2}}));
+    // A later gap is not put down to drops that an earlier one explained.
+    drop(300, 1);
+    EXPECT_EQ(causes(play(take, stage.sequence))["link_lost_it"], 3);
+    // Behind the last frame nobody's count tells, but that we dropped some.
+    drop(take.frames.size() - 4, 4);
+    for (size_t n = 310; n < take.frames.size(); ++n) take.frames[n].witness.host_drops = 3;
+    const Outcome ended = play(take, stage.sequence, 13, 0, {}, false, 3);
+    EXPECT_EQ(causes(ended)["no_frame"], 3);
+    EXPECT_EQ(causes(ended)["host_was_late"], 3);
+}
+
+TEST(Identify, lamps_that_give_no_light_are_the_cause_and_not_the_camera) {
+    SyntheticStage stage("single", 3);
+    const Take clean = record(stage);
+    const FrameSummary dark = clean.frames[find_slot(stage.sequence, SlotKind::dark, 0, 0)].witness.summary;
+    Take take = clean;
+    for (Delivery& frame : take.frames) frame.witness.summary = dark;
+    const Outcome never = play(take, stage.sequence);
+    EXPECT_EQ(never.missing.size(), take.triggers);
+    EXPECT_EQ(never.discarded.of(Cause::no_light), take.frames.size());
+    // From the second cycle on: each group's tracking frame tells.
+    take = clean;
+    for (size_t n = 180; n < take.frames.size(); ++n) take.frames[n].witness.summary = dark;
+    const Outcome failed = play(take, stage.sequence);
+    EXPECT_EQ(failed.notes.at(180).why.cause, Cause::no_light);
+    EXPECT_EQ(failed.mislabelled, 0);
 }
 
 TEST(Identify, duplicates_are_counted) {
@@ -336,16 +390,16 @@ TEST(Identify, a_missing_slot_tells_which_witnesses_it_had) {
     SyntheticStage stage("single", 2);
     Take take = record(stage);
     take.frames[216].witness.summary = take.frames[220].witness.summary;  // a tracking slot that looks like a lamp
-    take.frames[50].witness.unfit = "its size";
+    take.frames[50].witness.unfit = {Cause::wrong_size, "its size"};
     take.frames.erase(take.frames.begin() + 100);
     take.log.erase(take.log.begin() + 150);
     const Outcome outcome = play(take, stage.sequence);
     const auto& notes = outcome.notes;
     EXPECT_TRUE(notes.at(50).board && notes.at(50).camera);
-    EXPECT_NE(notes.at(50).why.find("size"), std::string::npos);
+    EXPECT_EQ(notes.at(50).why.cause, Cause::wrong_size);
     EXPECT_EQ(notes.at(216).optical, Sight::disagrees);
     EXPECT_TRUE(notes.at(100).board && !notes.at(100).camera);
-    EXPECT_NE(notes.at(100).why.find("counted"), std::string::npos);
+    EXPECT_EQ(notes.at(100).why.cause, Cause::link_lost_it);
     EXPECT_TRUE(!notes.at(150).board && notes.at(150).camera);
     // The landmark that looks wrong takes down its own group's tail, back to the matte slot before it.
     auto expected = range(200, 217);
