@@ -51,7 +51,8 @@ Result<Calibration> read_calibration(const std::string& folder, const StageConfi
     for (size_t c = 0; c < stage.cameras.size(); ++c) {
         const std::string of_camera = camera_folder(folder, c);
         auto file = TomlSection::open(of_camera + "/calibration.toml");
-        if (!file.ok()) return fail(fmt::format("camera {} is not calibrated: {}; {}", c, file.error().message, remedy));
+        if (!file.ok())
+            return fail(fmt::format("camera {} is not calibrated: {}; {}", c, file.error().message, remedy));
         CalibrationRecord record;
         file->read("card_reflectance", record.card_reflectance, 0, 1);
         file->read("card_exposure_us", record.card_exposure_us, 0, 1e9);
@@ -76,9 +77,8 @@ Status write_calibration(const std::string& folder, size_t camera, const CameraC
     if (error) return fail(fmt::format("cannot replace '{}': {}", facts, error.message()));
     if (Status s = write_exr(of_camera + "/black.exr", calibration.black, ExrType::single_float); !s.ok()) return s;
     if (Status s = write_exr(of_camera + "/flat.exr", calibration.flat, ExrType::single_float); !s.ok()) return s;
-    return write_whole_file(facts,
-                            fmt::format("card_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
-                                        record.card_reflectance, record.card_exposure_us, record.frames));
+    return write_whole_file(facts, fmt::format("card_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
+                                               record.card_reflectance, record.card_exposure_us, record.frames));
 }
 
 Calibration nominal_calibration(const StageConfig& stage) {

@@ -228,7 +228,11 @@ const Fault faults[] = {
      },
      only_it},
     {"swapped", [](Take& t, uint64_t n) { std::swap(t.frames[n], t.frames[n + 1]); }, nothing},
-    {"wrong size", [](Take& t, uint64_t n) { t.frames[n].witness.unfit = {Cause::wrong_size, "its size"}; }, only_it},
+    {"wrong size",
+     [](Take& t, uint64_t n) {
+         t.frames[n].witness.unfit = {Cause::wrong_size, "its size"};
+     },
+     only_it},
     {"bad timestamp", [](Take& t, uint64_t n) { t.frames[n].witness.stamp.timestamp_ns += 150'000; }, only_it},
     {"log entry lost", [](Take& t, uint64_t n) { t.log.erase(t.log.begin() + ptrdiff_t(n)); }, only_it},
     {"log entry of another slot", [](Take& t, uint64_t n) { ++t.log[n].slot; }, only_it},
@@ -344,11 +348,11 @@ TEST(Identify, a_gap_is_split_into_what_the_camera_missed_what_the_link_lost_and
     // did is known two frames before the gap comes up, as it is when frames wait to be read.
     drop(250, 7);
     shift_ids(250, 2);
-    for (size_t n = 248; n < take.frames.size(); ++n) take.frames[n].witness.disk_drops = 1, take.frames[n].witness.host_drops = 2;
-    EXPECT_EQ(causes(play(take, stage.sequence)), (nlohmann::json{{"disk_was_late", 1},
-                                                                  {"host_was_late", 2},
-                                                                  {"link_lost_it", 2},
-                                                                  {"camera_missed_trigger", 2}}));
+    for (size_t n = 248; n < take.frames.size(); ++n)
+        take.frames[n].witness.disk_drops = 1, take.frames[n].witness.host_drops = 2;
+    EXPECT_EQ(causes(play(take, stage.sequence)),
+              (nlohmann::json{
+                  {"disk_was_late", 1}, {"host_was_late", 2}, {"link_lost_it", 2}, {"camera_missed_trigger", 2}}));
     // A later gap is not put down to drops that an earlier one explained.
     drop(300, 1);
     EXPECT_EQ(causes(play(take, stage.sequence))["link_lost_it"], 3);
