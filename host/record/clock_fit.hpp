@@ -32,7 +32,8 @@ class ClockFit {
     uint64_t first_ticks_ = 0, first_ns_ = 0;
     uint64_t count_ = 0;
     double mean_x_ = 0, mean_y_ = 0;  // nanoseconds by the board's clock; and how much the other is ahead of it
-    double sum_xx_ = 0, sum_xy_ = 0, sum_yy_ = 0;  // about the means
+    double sum_xx_ = 0, sum_xy_ = 0;  // about the means
+    double rest_ = 0;                 // squares beside the line
 };
 
 // The machine's clock, from exchanges: the board told its time some time between a question and its answer. Of each stretch of
