@@ -59,8 +59,8 @@ void CameraReader::read() {
 
 // The camera says how many it had no room for; what filled the room is known here, at the time.
 void CameraReader::count_drops() {
-    const uint64_t drops = camera_.counts().dropped - dropped_before_ - disk_drops_ - host_drops_;
-    if (drops > 0) (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += drops;
+    const uint64_t more = camera_.counts().dropped - dropped_before_ - drops();
+    if (more > 0) (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
 }
 
 void CameraReader::enqueue(Frame frame) {

@@ -51,6 +51,8 @@ class CameraReader {
 
     // Frames read so far.
     uint64_t arrivals() const { return arrivals_; }
+    // Frames that the camera dropped for want of room so far, as far as the reader knows.
+    uint64_t drops() const { return disk_drops_ + host_drops_; }
 
   private:
     using Room = std::counting_semaphore<>;
@@ -66,7 +68,7 @@ class CameraReader {
     const std::shared_ptr<Room> room_;  // frames may outlive the reader
     RecordQueue& queue_;
     const uint64_t dropped_before_;
-    uint64_t disk_drops_ = 0, host_drops_ = 0;
+    std::atomic<uint64_t> disk_drops_ = 0, host_drops_ = 0;
     std::atomic<uint64_t> arrivals_ = 0;
     std::atomic<bool> end_ = false;
     std::thread thread_;
