@@ -22,7 +22,7 @@ INIT = HERE / "inside/init.c"
 
 # What the initramfs loads to reach the host's files, and what tests may ask for besides (with all that these depend on).
 AT_BOOT = ["virtio_pci", "9pnet_virtio", "9p", "overlay", "virtio_net", "vhci-hcd"]
-WANTED = AT_BOOT + ["vcan", "can-raw", "can-isotp", "can-gw", "vivid", "configfs", "videodev", "videobuf2-v4l2"]
+WANTED = AT_BOOT + ["vcan", "vxcan", "can-raw", "can-isotp", "vivid", "configfs", "videodev", "videobuf2-v4l2"]
 
 # Of Debian's kernel source. irq_sim.c is built into the kernel or not at all, so gpio-sim.ko brings it along.
 GPIO_SOURCES = ["drivers/gpio/gpio-sim.c", "drivers/gpio/gpiolib.h", "kernel/irq/irq_sim.c"]

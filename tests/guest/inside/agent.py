@@ -41,6 +41,8 @@ def load(modules, name, parameters=""):
 
 
 def unload(name):
+    if not pathlib.Path("/sys/module", name.replace("-", "_")).exists():
+        return
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.syscall(176, name.replace("-", "_").encode(), os.O_NONBLOCK) != 0:  # delete_module(2)
         raise OSError(ctypes.get_errno(), f"module {name}: {os.strerror(ctypes.get_errno())}")
