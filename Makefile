@@ -5,7 +5,7 @@ PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil fuzz-smoke \
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil guest-test fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -61,6 +61,9 @@ noise: all ## Wenger's SNR comparison on the virtual stage, and what designed ba
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(PYTHON) -m pytest -q tests/hil tests/capture
+
+guest-test: all ## stagectl on the real kernel's CAN, USB, V4L2 and GPIO, in a QEMU guest (the first time some 220 MB to download)
+	@$(PYTHON) -m pytest -q tests/guest
 
 fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fuzzer
 	@tests/fuzz/run.sh smoke

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "device/can_place.hpp"
 #include "device/patience.hpp"
 #include "result.hpp"
 
@@ -31,8 +32,8 @@ class CanBus {
     virtual uint64_t now_us() const = 0;
 };
 
-// A SocketCAN interface, as in `ip link`: "can0". Only frames with `id` are received.
-Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id);
+// A SocketCAN interface, as in `ip link`: "can0". Only frames from the board are received.
+Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place);
 
 // The emulated bus (docs/architecture.md, "CAN frames over a socket").
 Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, const Deadline& deadline);

@@ -13,9 +13,7 @@
 
 namespace ols {
 
-namespace {
-
-const char* error_text(isotp_error error) {
+const char* isotp_error_text(isotp_error error) {
     switch (error) {
         case ISOTP_OK: return "no error";
         case ISOTP_TIMEOUT_A: return "N_TIMEOUT_A: the bus took no frame in time; check its termination and bit rate";
@@ -29,6 +27,8 @@ const char* error_text(isotp_error error) {
         default: return "unknown error";
     }
 }
+
+namespace {
 
 class CanTransfer : public Transfer {
   public:
@@ -88,11 +88,12 @@ class CanTransfer : public Transfer {
     void begin_anew() { isotp_init(&isotp_, message_, sizeof message_, 0); }  // any block: the kernel's queue is long
 
     void begin_transfer(uint32_t timeout_us) {
+        timeout_us_ = timeout_us;
         until_us_ = bus_->now_us() + timeout_us;
         frames_left_ = frames_max;
     }
 
-    // Sends what is due, or waits for a frame. The error says that the board did not do `what` in time.
+    // Sends what is due, or waits for a frame. The error says that the board did not do `what` in time: it was silent for so long.
     Status step(const Deadline& deadline, const char* what) {
         if (bus_->now_us() >= until_us_ || deadline.left_ms() == 0)
             return fail(fmt::format("{} did not {} in time: reset it and start over", name(), what));
@@ -104,13 +105,15 @@ class CanTransfer : public Transfer {
         if (frame.can_dlc > 0) return bus_->send(frame, deadline);
         const auto got = bus_->receive(std::min(until_us_, isotp_due_us(&isotp_)), deadline);
         if (!got.ok()) return got.error();
-        if (*got && (*got)->can_id == to_host_)
+        if (*got && (*got)->can_id == to_host_) {
             isotp_take_frame(&isotp_, (*got)->data, (*got)->can_dlc, bus_->now_us());
+            until_us_ = bus_->now_us() + timeout_us_;
+        }
         isotp_poll(&isotp_, bus_->now_us());
         return Done{};
     }
 
-    Error failure() const { return fail(name() + ": " + error_text(isotp_.last_error)); }
+    Error failure() const { return fail(name() + ": " + isotp_error_text(isotp_.last_error)); }
 
     // A second of a bus at 1 Mbit/s that is full of the shortest frames, 47 bits (ISO 11898-1), holds 21 276.
     static constexpr int frames_max = 100'000;
@@ -120,8 +123,8 @@ class CanTransfer : public Transfer {
     uint16_t to_board_, to_host_;
     isotp isotp_;
     uint8_t message_[OLS_FRAME_BYTES_MAX];
-    size_t taken_ = 0;       // of the message received
-    uint64_t until_us_ = 0;  // of the transfer under way
+    size_t taken_ = 0;                        // of the message received
+    uint64_t timeout_us_ = 0, until_us_ = 0;  // of the transfer under way
     int frames_left_ = 0;
 };
 
@@ -129,23 +132,6 @@ class CanTransfer : public Transfer {
 
 std::unique_ptr<Transfer> can_transfer(std::unique_ptr<CanBus> bus, unsigned board_number) {
     return std::make_unique<CanTransfer>(std::move(bus), board_number);
-}
-
-Result<std::unique_ptr<Transfer>> open_can(const std::string& link, const Deadline& deadline) {
-    const size_t colon = link.find(':'), mark = link.rfind('#');
-    std::string place = link.substr(colon + 1, mark == std::string::npos ? mark : mark - colon - 1);
-    unsigned board_number = 0;
-    if (mark != std::string::npos) {
-        const std::string text = link.substr(mark + 1);
-        if (text.empty() || text.size() > 2 || text.find_first_not_of("0123456789") != std::string::npos ||
-            std::stoi(text) > 15)
-            return fail("'" + link + "': boards on a CAN bus have the numbers 0 to 15, as in can:can0#2");
-        board_number = unsigned(std::stoi(text));
-    }
-    const auto id = uint16_t(OLS_CANBUS_TO_HOST + 16 * board_number);
-    auto bus = link.starts_with("can:") ? open_socketcan(place, id) : open_can_socket(place, deadline);
-    if (!bus.ok()) return bus.error();
-    return can_transfer(std::move(*bus), board_number);
 }
 
 }  // namespace ols

@@ -6,8 +6,12 @@
 
 #include "device/can_bus.hpp"
 #include "device/transfer.hpp"
+#include "isotp.h"
 
 namespace ols {
+
+// Why a message was given up, by the standard's name, and what to do.
+const char* isotp_error_text(isotp_error error);
 
 // To the board of that number (PROTOCOL.md, "CAN").
 std::unique_ptr<Transfer> can_transfer(std::unique_ptr<CanBus> bus, unsigned board_number);

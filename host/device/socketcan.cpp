@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
-// SocketCAN: raw frames of an interface of this machine (Linux, Documentation/networking/can.rst). ISO-TP is our own
-// above it, the one that the board has: the kernel's CAN_ISOTP is not in every kernel and would be a second one to trust.
+// SocketCAN: raw frames of an interface of this machine (Linux, Documentation/networking/can.rst), for kernels without CAN_ISOTP.
 #include <fmt/format.h>
 #include <linux/can/raw.h>
-#include <net/if.h>
 #include <poll.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -22,10 +19,10 @@ namespace {
 
 class SocketCan : public CanBus {
   public:
-    SocketCan(int fd, std::string interface) : fd_(fd), interface_(std::move(interface)) {}
+    SocketCan(int fd, CanPlace place) : fd_(fd), place_(std::move(place)) {}
     ~SocketCan() override { ::close(fd_); }
 
-    std::string name() const override { return "the CAN interface '" + interface_ + "'"; }
+    std::string name() const override { return "the CAN interface '" + place_.interface + "'"; }
 
     Status send(const can_frame& frame, const Deadline& deadline) override {
         for (const uint64_t begin_us = now_us();;) {
@@ -34,7 +31,7 @@ class SocketCan : public CanBus {
             // A full queue is not an error that poll() could wait for: the kernel drops instead (can.rst, 4.1.7).
             if (errno != ENOBUFS) return lost();
             if (now_us() - begin_us > queue_timeout_us || deadline.left_ms() == 0)
-                return fail("the CAN bus '" + interface_ +
+                return fail("the CAN bus '" + place_.interface +
                             "' takes no frames: is the board on, the bus terminated, the bit rate the board's?");
             ::usleep(queue_retry_us);
         }
@@ -63,39 +60,23 @@ class SocketCan : public CanBus {
     static constexpr uint64_t queue_timeout_us = 1'000'000;
     static constexpr useconds_t queue_retry_us = 200;  // a frame or two
 
-    Error lost() const {
-        return fail(fmt::format("the CAN interface '{}' is down ({}): sudo ip link set {} up type can bitrate 1000000",
-                                interface_, std::strerror(errno), interface_));
-    }
+    Error lost() const { return can_down(place_, errno); }
 
     int fd_;
-    std::string interface_;
+    CanPlace place_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id) {
-    ifreq request{};
-    if (interface.empty() || interface.size() >= sizeof request.ifr_name)
-        return fail("'" + interface + "' is no name of a network interface: see `ip link`");
-    std::memcpy(request.ifr_name, interface.c_str(), interface.size());
-    const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
-    if (fd < 0) return fail(fmt::format("this kernel has no CAN ({}): modprobe can_raw", std::strerror(errno)));
-    sockaddr_can address{};
-    address.can_family = AF_CAN;
-    const can_filter only{id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
-    const bool found = ::ioctl(fd, SIOCGIFINDEX, &request) == 0;
-    address.can_ifindex = request.ifr_ifindex;
-    if (!found || ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &only, sizeof only) != 0 ||
-        ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        const int error = errno;
-        ::close(fd);
-        return fail(
-            fmt::format("no CAN interface '{}' ({}): see `ip link`, then sudo ip link set {} up type can bitrate "
-                        "1000000",
-                        interface, std::strerror(error), interface));
-    }
-    return std::unique_ptr<CanBus>(std::make_unique<SocketCan>(fd, interface));
+Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place) {
+    const auto opened = open_can_address(place, SOCK_RAW, CAN_RAW);
+    if (!opened.ok()) return opened.error();
+    auto bus = std::make_unique<SocketCan>(opened->fd, place);
+    const can_filter only{place.to_host(), CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    if (::setsockopt(opened->fd, SOL_CAN_RAW, CAN_RAW_FILTER, &only, sizeof only) != 0 ||
+        ::bind(opened->fd, reinterpret_cast<const sockaddr*>(&opened->address), sizeof opened->address) != 0)
+        return can_down(place, errno);
+    return std::unique_ptr<CanBus>(std::move(bus));
 }
 
 }  // namespace ols

@@ -19,11 +19,20 @@ namespace {
 // fills in 22 ms, at 20 000 in 2.4 ms; the board keeps 1024.
 constexpr std::chrono::milliseconds poll_pause(2);
 
-// Why a board that no longer plays has stopped; "" when it played to the end.
-std::string reason_to_end(const ols_status_reply& status, const std::string& why_told) {
-    if (status.state == OLS_STATE_DONE) return "";
-    if (status.state == OLS_STATE_FAULT) return "the board stopped with fault " + fault_text(status);
-    return why_told.empty() ? "somebody stopped the board" : why_told;
+// Why a board that no longer plays has stopped; empty when it played to the end.
+Reason reason_to_end(const ols_status_reply& status, const Reason& why_told) {
+    if (status.state == OLS_STATE_DONE) return {};
+    if (status.state == OLS_STATE_FAULT)
+        return {Cause::board_did_not_fire, "the board stopped with fault " + fault_text(status)};
+    return why_told.empty() ? Reason{Cause::stopped, "somebody stopped the board"} : why_told;
+}
+
+uint64_t steady_ns() {
+    return uint64_t(std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count());
+}
+
+LogEnd lost(std::string why) {
+    return {{Cause::board_gone, std::move(why)}, true};
 }
 
 }  // namespace
@@ -36,12 +45,12 @@ PlayBounds::PlayBounds(const Sequence& sequence) {
     ticks = (uint64_t(sequence.config.cycles) + 1) * sequence.cycle_ticks() + tick_hz;
 }
 
-BoardLog::BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uint64_t>& arrivals,
-                   std::function<std::string()> why_stop, std::function<void(LogNews)> on_news,
+BoardLog::BoardLog(Board& board, const PlayBounds& bounds, std::function<std::vector<uint64_t>()> arrivals,
+                   std::function<Reason()> why_stop, std::function<void(LogNews)> on_news,
                    std::function<void(LogEnd)> on_end)
     : board_(board),
       bounds_(bounds),
-      arrivals_(arrivals),
+      arrivals_(std::move(arrivals)),
       why_stop_(std::move(why_stop)),
       on_news_(std::move(on_news)) {
     thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
@@ -53,7 +62,7 @@ BoardLog::~BoardLog() {
 
 LogEnd BoardLog::follow() {
     auto read = guarded("the board's log cannot be followed", [this] { return Result<LogEnd>(read_to_end()); });
-    LogEnd end = read ? std::move(*read) : LogEnd{read.error().message, true};
+    LogEnd end = read ? std::move(*read) : lost(read.error().message);
     if (end.is_lost) board_.tell_to_stop();
     return end;
 }
@@ -75,28 +84,31 @@ Status BoardLog::check_clock(const ols_status_reply& status) {
 
 LogEnd BoardLog::read_to_end() {
     LogReader reader(board_, bounds_.triggers);
-    std::string told_to_stop;
-    std::optional<std::string> ending;
+    Reason told_to_stop;
+    std::optional<Reason> ending;
     for (std::optional<uint32_t> fired_at_end;;) {
         if (told_to_stop.empty() && !(told_to_stop = why_stop_()).empty()) {
             // A board that has finished or failed meanwhile refuses, which its status then explains.
             (void)board_.stop();
         }
-        const uint64_t arrivals = arrivals_;
+        std::vector<uint64_t> arrivals = arrivals_();
         auto log = reader.read_on();
-        if (!log.ok()) return {log.error().message, true};
+        if (!log.ok()) return lost(log.error().message);
         const size_t count = log->entries.size();
-        on_news_({std::move(log->entries), reader.fired(), arrivals});
+        on_news_({std::move(log->entries), reader.fired(), std::move(arrivals)});
         if (ending && fired_at_end.value_or(reader.fired()) != reader.fired())
-            return {board_.name() + " fires on although it says that it has stopped: reset it", true};
+            return lost(board_.name() + " fires on although it says that it has stopped: reset it");
         if (ending) fired_at_end = reader.fired();
         if (count >= OLS_LOG_ENTRIES_MAX) continue;
         if (ending && count == 0) return {*ending};
         if (ending) continue;
+        const uint64_t asked_ns = steady_ns();
         const auto status = board_.status();
-        if (!status.ok()) return {status.error().message, true};
-        if (status->boot_nonce != board_.info().boot_nonce) return {"the board was reset", true};
-        if (const Status goes_on = check_clock(*status); !goes_on.ok()) return {goes_on.error().message, true};
+        const uint64_t answered_ns = steady_ns();
+        if (!status.ok()) return lost(status.error().message);
+        if (status->boot_nonce != board_.info().boot_nonce) return lost("the board was reset");
+        if (const Status goes_on = check_clock(*status); !goes_on.ok()) return lost(goes_on.error().message);
+        if (status->state == OLS_STATE_PLAYING) host_clock_.add(asked_ns, answered_ns, status->now_ticks);
         if (status->state != OLS_STATE_PLAYING && status->state != OLS_STATE_WAITING)
             ending = reason_to_end(*status, told_to_stop);
         else

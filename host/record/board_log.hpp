@@ -2,7 +2,6 @@
 // BoardLog: follows a playing board from a thread of its own and tells what it fired.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
@@ -10,6 +9,8 @@
 #include <vector>
 
 #include "device/board.hpp"
+#include "record/cause.hpp"
+#include "record/clock_fit.hpp"
 #include "stage/sequence.hpp"
 
 namespace ols {
@@ -17,12 +18,12 @@ namespace ols {
 struct LogNews {
     std::vector<ols_trigger_log_entry> entries;
     uint64_t next_counter = 0;
-    uint64_t arrivals = 0;  // frames that had arrived before the board was asked
+    std::vector<uint64_t> arrivals;  // of each camera: frames that had arrived before the board was asked
 };
 
 // How a log ended.
 struct LogEnd {
-    std::string why;       // the board stopped early, or is heard no more; "" when it has played everything
+    Reason why;            // the board stopped early, or is heard no more; empty when it has played everything
     bool is_lost = false;  // it is heard no more: what it fired later than the last news is not known
 };
 
@@ -36,14 +37,17 @@ struct PlayBounds {
 
 class BoardLog {
   public:
-    // Starts to follow; all functions are called from the thread. `arrivals` counts the frames read from the camera.
+    // Starts to follow; all functions are called from the thread. `arrivals` counts the frames read from each camera.
     // on_end comes once, last.
     // When `why_stop` says something the board is told to stop, and what it fired until then is still read; LogEnd says it.
     // A board that is heard no more, or whose log or clock does not go on as it must, is told to stop and given up.
-    BoardLog(Board& board, const PlayBounds& bounds, const std::atomic<uint64_t>& arrivals,
-             std::function<std::string()> why_stop, std::function<void(LogNews)> on_news,
+    BoardLog(Board& board, const PlayBounds& bounds, std::function<std::vector<uint64_t>()> arrivals,
+             std::function<Reason()> why_stop, std::function<void(LogNews)> on_news,
              std::function<void(LogEnd)> on_end);
     ~BoardLog();  // waits for the end
+
+    // This machine's steady clock beside the board's, by what was asked of the board. After the end.
+    std::optional<ClockRelation> host_clock() const { return host_clock_.relation(); }
 
   private:
     LogEnd follow();
@@ -52,9 +56,10 @@ class BoardLog {
 
     Board& board_;
     const PlayBounds bounds_;
-    const std::atomic<uint64_t>& arrivals_;
-    std::function<std::string()> why_stop_;
+    std::function<std::vector<uint64_t>()> arrivals_;
+    std::function<Reason()> why_stop_;
     std::function<void(LogNews)> on_news_;
+    HostClock host_clock_;
     uint64_t last_tick_ = 0;  // that the board told
     std::optional<Deadline> next_tick_;
     std::thread thread_;

@@ -28,13 +28,14 @@ void Identifier::add_log(const std::vector<ols_trigger_log_entry>& entries, uint
     settle();
 }
 
-void Identifier::end_log(const std::string& why) {
+void Identifier::end_log(const Reason& why) {
     log_ended_ = why;
     settle();
 }
 
-void Identifier::end_frames(const std::string& why) {
+void Identifier::end_frames(const Reason& why, uint64_t disk_drops, uint64_t host_drops) {
     placer_.end();
+    last_drops_ = placer_.drops_left(disk_drops, host_drops);
     frames_ended_ = why;
     settle();
 }
@@ -84,21 +85,30 @@ bool Identifier::fits_program(const ols_trigger_log_entry& entry) const {
            std::abs(int64_t(entry.rise_ticks) - expected) <= tolerance_ticks;
 }
 
+// Of a trigger behind the last frame: we know of a loss only when it was ours.
+Reason Identifier::take_last_loss() {
+    if (last_drops_.empty()) return {Cause::no_frame, "no frame came"};
+    Reason why = std::move(last_drops_.back());
+    last_drops_.pop_back();
+    return why;
+}
+
 void Identifier::match_log() {
     for (; !accepted_.empty(); accepted_.pop_front()) {
         const Accepted frame = accepted_.front();
         const auto entry = log_.find(frame.counter);
         if (entry != log_.end() && fits_program(entry->second)) {
             identified_[frame.counter] = true;
-            verdicts_.push_back({Verdict::identified, frame.arrival, entry->second, {}, ""});
+            verdicts_.push_back({Verdict::identified, frame.arrival, entry->second, {}, {}});
             continue;
         }
         if (entry == log_.end() && frame.counter >= log_end_ && !log_ended_) return;
         MissingSlot& slot = note(frame.counter);
         slot.camera = true;
-        slot.why = entry != log_.end()        ? "the trigger log has another slot or time than the program"
-                   : frame.counter < log_end_ ? "the board's trigger log lost it"
-                   : log_ended_->empty()      ? "the board did not fire it"
+        slot.why = entry != log_.end()
+                       ? Reason{Cause::log_lost_it, "the trigger log has another slot or time than the program"}
+                   : frame.counter < log_end_ ? Reason{Cause::log_lost_it, "the board's trigger log lost it"}
+                   : log_ended_->empty()      ? Reason{Cause::board_did_not_fire, "the board did not fire it"}
                                               : *log_ended_;
         verdicts_.push_back({Verdict::discarded, frame.arrival, {}, {}, slot.why});
     }
@@ -115,9 +125,9 @@ void Identifier::decide() {
             if (slot.why.empty()) {
                 const bool fired = slot.board || !log_ended_ || log_ended_->empty();
                 const bool camera_went = frames_ended_ && !frames_ended_->empty() && decided_ >= frames_until_;
-                slot.why = !fired ? *log_ended_ : camera_went ? *frames_ended_ : "no frame came";
+                slot.why = !fired ? *log_ended_ : camera_went ? *frames_ended_ : take_last_loss();
             }
-            verdicts_.push_back({Verdict::missing, 0, {}, slot, ""});
+            verdicts_.push_back({Verdict::missing, 0, {}, slot, {}});
         }
         notes_.erase(decided_);
         log_.erase(decided_);

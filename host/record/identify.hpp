@@ -18,7 +18,7 @@ namespace ols {
 // What is known of a trigger that has no frame.
 struct MissingSlot {
     uint64_t counter = 0;
-    std::string why;
+    Reason why;
     bool board = false;             // the trigger log has it
     bool camera = false;            // a frame came whose time is this trigger's
     Sight optical = Sight::silent;  // what that frame looked like
@@ -29,7 +29,7 @@ struct Verdict {
     uint64_t arrival = 0;           // of the frame; not for a missing slot
     ols_trigger_log_entry entry{};  // its trigger, when identified
     MissingSlot slot;               // when missing
-    std::string why;                // when discarded
+    Reason why;                     // when discarded
 };
 
 class Identifier {
@@ -43,11 +43,12 @@ class Identifier {
     // arrival below `arrivals` were here before the board was asked.
     void add_log(const std::vector<ols_trigger_log_entry>& entries, uint64_t next_counter, uint64_t arrivals);
 
-    // No more entries: the board has finished ("") or cannot be heard any more, and why.
-    void end_log(const std::string& why);
+    // No more entries: the board has finished ({}) or cannot be heard any more, and why.
+    void end_log(const Reason& why = {});
 
-    // No more frames: the camera has delivered everything ("") or gives no more, and why.
-    void end_frames(const std::string& why = "");
+    // No more frames: the camera has delivered everything ({}) or gives no more, and why. `disk_drops` and `host_drops`: how many
+    // we had dropped in all (FrameWitness).
+    void end_frames(const Reason& why = {}, uint64_t disk_drops = 0, uint64_t host_drops = 0);
 
     // What was decided since the last call. Frames get one verdict each, and so do triggers: all of them, once both ends
     // are told.
@@ -67,6 +68,7 @@ class Identifier {
     void take_placements();
     void match_log();
     void decide();
+    Reason take_last_loss();
     MissingSlot& note(uint64_t counter);
     bool fits_program(const ols_trigger_log_entry& entry) const;
 
@@ -77,14 +79,15 @@ class Identifier {
     std::map<uint64_t, ols_trigger_log_entry> log_;  // of triggers that are not decided
     std::optional<ols_trigger_log_entry> first_entry_;
     uint64_t log_end_ = 0;  // entries below this came or never will
-    std::optional<std::string> log_ended_;
+    std::optional<Reason> log_ended_;
 
     std::deque<Accepted> accepted_;          // frames that wait for their log entry, by counter
     std::map<uint64_t, MissingSlot> notes_;  // what is known of undecided triggers without a frame
     std::map<uint64_t, bool> identified_;    // undecided triggers that have one
     uint64_t decided_ = 0;
     uint64_t frames_until_ = 0;  // above the last trigger that a frame was found for
-    std::optional<std::string> frames_ended_;
+    std::optional<Reason> frames_ended_;
+    std::vector<Reason> last_drops_;  // by us, that no frame came after
     std::vector<Verdict> verdicts_;
 };
 

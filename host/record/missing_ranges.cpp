@@ -19,6 +19,7 @@ const char* sight_name(Sight sight) {
 }  // namespace
 
 void MissingRanges::add(const MissingSlot& slot) {
+    causes_.add(slot.why.cause);
     if (!ranges_.empty()) {
         Range& last = ranges_.back();
         const MissingSlot& first = last.first;
@@ -31,10 +32,10 @@ void MissingRanges::add(const MissingSlot& slot) {
     ranges_.push_back({slot, 1});
 }
 
-std::string MissingRanges::cause_within(uint64_t first, uint64_t last) const {
+Reason MissingRanges::cause_within(uint64_t first, uint64_t last) const {
     for (const Range& range : ranges_)
         if (range.first.counter <= last && range.first.counter + range.count > first) return range.first.why;
-    return "";
+    return {};
 }
 
 nlohmann::json MissingRanges::to_json() const {
@@ -46,7 +47,8 @@ nlohmann::json MissingRanges::to_json() const {
                         {"cycle", range.first.counter / sequence_.slots.size()},
                         {"slot", slot},
                         {"kind", slot_kind_name(sequence_.slots[slot].kind)},
-                        {"why", range.first.why},
+                        {"cause", cause_name(range.first.why.cause)},
+                        {"why", range.first.why.text},
                         {"witnesses",
                          {{"board", range.first.board},
                           {"camera", range.first.camera},

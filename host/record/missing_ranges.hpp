@@ -16,10 +16,12 @@ class MissingRanges {
     // Slots come in order of their triggers.
     void add(const MissingSlot& slot);
 
-    // Why the first missing one of the slots `first` to `last` is, "" when none is.
-    std::string cause_within(uint64_t first, uint64_t last) const;
+    // Why the first missing one of the slots `first` to `last` is; empty when none is.
+    Reason cause_within(uint64_t first, uint64_t last) const;
 
-    // [{"first_trigger", "count", "cycle", "slot", "kind", "why", "witnesses": {"board", "camera", "optical"}}]; cycle,
+    const CauseCounts& causes() const { return causes_; }
+
+    // [{"first_trigger", "count", "cycle", "slot", "kind", "cause", "why", "witnesses": {"board", "camera", "optical"}}]; cycle,
     // slot and kind are the first trigger's.
     nlohmann::json to_json() const;
 
@@ -30,6 +32,7 @@ class MissingRanges {
     };
     const Sequence& sequence_;
     std::vector<Range> ranges_;
+    CauseCounts causes_;
 };
 
 }  // namespace ols

@@ -16,6 +16,8 @@ std::vector<SlotKind> kinds_of(const Sequence& sequence) {
     return kinds;
 }
 
+const Reason off_grid = {Cause::not_proved, "its time fits no trigger"};
+
 }  // namespace
 
 FramePlacer::FramePlacer(const Sequence& sequence, const IdentifyOptions& options)
@@ -32,9 +34,11 @@ void FramePlacer::add(FrameWitness frame) {
     switch (window_.add(std::move(frame))) {
         case ReorderWindow::Arrival::duplicate:
             ++duplicates_;
-            refuse(copy, "duplicate: the camera delivered this id and time before");
+            refuse(copy, {Cause::not_proved, "duplicate: the camera delivered this id and time before"});
             break;
-        case ReorderWindow::Arrival::too_late: refuse(copy, "late: delivered after its reorder window"); break;
+        case ReorderWindow::Arrival::too_late:
+            refuse(copy, {Cause::link_lost_it, "late: delivered after its reorder window"});
+            break;
         case ReorderWindow::Arrival::in_time: break;
     }
     while (auto next = window_.take(false)) process(std::move(*next));
@@ -53,15 +57,15 @@ void FramePlacer::bound(uint64_t arrivals, uint64_t fired) {
 
 void FramePlacer::end() {
     while (auto next = window_.take(true)) process(std::move(*next));
-    if (stray_) refuse(*stray_, "its time fits no trigger");
+    if (stray_) refuse(*stray_, off_grid);
     stray_.reset();
     end_stretch();
 }
 
 void FramePlacer::process(FrameWitness frame) {
-    if (!grid_) return begin_stretch(std::move(frame), "before the camera's first frame");
+    if (!grid_) return begin_stretch(std::move(frame), {Cause::no_frame, "before the camera's first frame"});
     if (append(frame)) {
-        if (stray_) refuse(*stray_, "its time fits no trigger");
+        if (stray_) refuse(*stray_, off_grid);
         stray_.reset();
         return;
     }
@@ -72,24 +76,26 @@ void FramePlacer::process(FrameWitness frame) {
         if (steps && *steps == frame.stamp.frame_id - stray_->stamp.frame_id) {
             end_stretch();
             ++camera_restarts_;
-            begin_stretch(std::move(*stray_), "the camera's clock was set anew, and no frame is proved to be this one");
+            begin_stretch(std::move(*stray_), {Cause::restarted,
+                                               "the camera's clock was set anew, and no frame is proved to be this "
+                                               "one"});
             stray_.reset();
             append(frame);
             return;
         }
     }
-    if (stray_) refuse(*stray_, "its time fits no trigger");
+    if (stray_) refuse(*stray_, off_grid);
     stray_ = std::move(frame);
 }
 
-void FramePlacer::begin_stretch(FrameWitness frame, const std::string& gap) {
+void FramePlacer::begin_stretch(FrameWitness frame, Reason gap) {
     grid_.emplace(period_ns_, frame.stamp.timestamp_ns, code_.cycle_slots());
     last_stamp_ = frame.stamp;
     last_epoch_ = frame.epoch;
     last_position_ = 0;
     locked_ = false;
     next_attempt_ = code_.cycle_slots();
-    place({std::move(frame), 0, true, gap});
+    place({std::move(frame), 0, true, {std::move(gap)}});
 }
 
 // Adds a frame to the stretch if its time lies on the grid and the sequence has a trigger there.
@@ -99,15 +105,9 @@ bool FramePlacer::append(FrameWitness& frame) {
     grid_->advance(*steps, frame.stamp.timestamp_ns);
     const bool restarted = frame.epoch != last_epoch_;
     const uint64_t id_steps = frame.stamp.frame_id - last_stamp_.frame_id;
-    std::string gap;
-    if (restarted) {
-        ++camera_restarts_;
-        gap = "the camera was restarted";
-    } else if (id_steps == *steps) {
-        gap = "lost: the camera counted the frame and it did not come";
-    } else {
-        gap = "the camera did not count the trigger";
-    }
+    camera_restarts_ += restarted;
+    std::vector<Reason> gap = restarted ? std::vector<Reason>{{Cause::restarted, "the camera was restarted"}}
+                                        : losses(frame, *steps, id_steps);
     last_stamp_ = frame.stamp;
     last_epoch_ = frame.epoch;
     last_position_ += *steps;
@@ -115,11 +115,36 @@ bool FramePlacer::append(FrameWitness& frame) {
     return true;
 }
 
+// Why the triggers between the frame before and this one have none: of as many as ids were passed over, the frames were lost on
+// their way, and of these as many by us as were dropped meanwhile; the camera saw nothing of the others. Which of them is which
+// is not known: the numbers are right, and their order here is not.
+std::vector<Reason> FramePlacer::losses(const FrameWitness& frame, uint64_t steps, uint64_t id_steps) {
+    const uint64_t gap = steps - 1;
+    const uint64_t lost = id_steps == 0 ? 0 : std::min(gap, id_steps - 1);
+    std::vector<Reason> reasons = take_drops(lost, frame.disk_drops, frame.host_drops);
+    reasons.resize(lost, {Cause::link_lost_it, "lost: the camera counted the frame and it did not come"});
+    reasons.insert(reasons.end(), gap - lost, {Cause::camera_missed_trigger, "the camera did not count the trigger"});
+    if (reasons.empty()) reasons.push_back({Cause::no_frame, "no frame came"});
+    return reasons;
+}
+
+// Of the drops that were told of, those that no gap was found for yet, `count` at most.
+std::vector<Reason> FramePlacer::take_drops(uint64_t count, uint64_t disk_drops, uint64_t host_drops) {
+    const uint64_t by_disk = std::min(count, disk_drops - std::min(disk_drops, disk_drops_));
+    const uint64_t by_host = std::min(count - by_disk, host_drops - std::min(host_drops, host_drops_));
+    disk_drops_ += by_disk;
+    host_drops_ += by_host;
+    std::vector<Reason> reasons(
+        by_disk, {Cause::disk_was_late, "dropped: it came, and room was held by what waited for the archive's disk"});
+    reasons.resize(by_disk + by_host, {Cause::host_was_late, "dropped: it came, and there was no room for it"});
+    return reasons;
+}
+
 void FramePlacer::place(Pending pending) {
     if (locked_) return examine(std::move(pending));
     unlocked_.push_back(std::move(pending));
     if (unlocked_.size() > options_.pending_max)
-        give_up_oldest(1, "its place in the cycle was not proved before memory ran out");
+        give_up_oldest(1, {Cause::not_proved, "its place in the cycle was not proved before memory ran out"});
     if (last_position_ + 1 < next_attempt_) return;
     next_attempt_ = last_position_ + 1 + group_slots_;
     try_lock();
@@ -145,7 +170,7 @@ void FramePlacer::try_lock() {
     }
     if (end <= next_counter_) return;
     const OpticalCode::Search found = code_.search(seen, next_counter_, end - 1);
-    if (found.possible == 0) return give_up_oldest(group_slots_, "no place in the cycle fits it");
+    if (found.possible == 0) return give_up_oldest(group_slots_, nothing_fits());
     if (found.possible > 1 || !found.proved) return;
     locked_ = true;
     first_counter_ = found.counter;
@@ -161,31 +186,45 @@ void FramePlacer::try_lock() {
     for (Pending& pending : std::exchange(unlocked_, {})) examine(std::move(pending));
 }
 
-void FramePlacer::give_up_oldest(size_t count, const std::string& why) {
+// Of the frames of a stretch that has no place.
+Reason FramePlacer::nothing_fits() const {
+    const auto shows_light = [](const Pending& pending) {
+        return !pending.frame.unfit.empty() || !is_dark(pending.frame.summary);
+    };
+    if (std::ranges::any_of(unlocked_, shows_light)) return {Cause::not_proved, "no place in the cycle fits it"};
+    return {Cause::no_light, "no frame shows any light: check the lamps' supply, the lens and its cap"};
+}
+
+void FramePlacer::give_up_oldest(size_t count, const Reason& why) {
     for (; count > 0 && !unlocked_.empty(); --count) {
         refuse(unlocked_.front().frame, why);
         unlocked_.pop_front();
-        if (!unlocked_.empty()) unlocked_.front().gap = why;
+        if (!unlocked_.empty()) unlocked_.front().gap = {why};
     }
 }
 
 void FramePlacer::examine(Pending pending) {
     const uint64_t counter = counter_of(pending);
     if (pending.begins_run) end_run();
-    for (; next_counter_ < counter; ++next_counter_) placements_.push_back({{}, next_counter_, false, pending.gap});
+    for (size_t n = 0; next_counter_ < counter; ++next_counter_, ++n)
+        placements_.push_back({{}, next_counter_, false, pending.gap[std::min(n, pending.gap.size() - 1)]});
     next_counter_ = counter + 1;
     const FrameWitness& frame = pending.frame;
     const Sight sight = frame.unfit.empty() ? code_.look(counter, frame.summary) : Sight::silent;
     pending.optical = sight;
     if (sight >= Sight::agrees) code_.learn(counter, frame.summary);
     waiting_.push_back(std::move(pending));
-    if (waiting_.size() > options_.pending_max) refuse_waiting("no landmark proved it before memory ran out");
+    if (waiting_.size() > options_.pending_max)
+        refuse_waiting({Cause::not_proved, "no landmark proved it before memory ran out"});
     if (sight == Sight::proves) {
         accept_waiting();
         proved_ = true;
     } else if (sight == Sight::disagrees) {
-        refuse_waiting(fmt::format("the optical code disagrees: trigger {} does not look like a {} slot", counter,
-                                   slot_kind_name(code_.kind_at(counter))));
+        const bool no_light = code_.kind_at(counter) == SlotKind::tracking && is_dark(frame.summary);
+        refuse_waiting(
+            {no_light ? Cause::no_light : Cause::not_proved,
+             fmt::format("the optical code disagrees: trigger {} {} a {} slot", counter,
+                         no_light ? "is dark, and is" : "does not look like", slot_kind_name(code_.kind_at(counter)))});
         proved_ = false;
     }
 }
@@ -194,14 +233,16 @@ void FramePlacer::end_run() {
     if (proved_)
         accept_waiting();
     else
-        refuse_waiting("no landmark proves it: the camera's count broke before and after it");
+        refuse_waiting({Cause::not_proved, "no landmark proves it: the camera's count broke before and after it"});
     proved_ = false;
 }
 
 void FramePlacer::end_stretch() {
     if (!locked_ && !unlocked_.empty()) try_lock();
     if (locked_) end_run();
-    for (const Pending& pending : unlocked_) refuse(pending.frame, "its place in the cycle could not be proved");
+    Reason why = nothing_fits();
+    if (why.cause != Cause::no_light) why.text = "its place in the cycle could not be proved";
+    for (const Pending& pending : unlocked_) refuse(pending.frame, why);
     unlocked_.clear();
     grid_.reset();
     is_first_stretch_ = false;
@@ -218,18 +259,26 @@ void FramePlacer::accept_waiting() {
     waiting_.clear();
 }
 
-void FramePlacer::refuse_waiting(const std::string& why) {
-    for (const Pending& pending : waiting_)
-        placements_.push_back({pending.frame.arrival, counter_of(pending), false, why, pending.optical});
+// Where it is light that was missing, frames that have some are only not proved.
+void FramePlacer::refuse_waiting(const Reason& why) {
+    for (const Pending& pending : waiting_) {
+        const bool is_lit = why.cause == Cause::no_light && !is_dark(pending.frame.summary);
+        placements_.push_back({pending.frame.arrival, counter_of(pending), false,
+                               is_lit ? Reason{Cause::not_proved, why.text} : why, pending.optical});
+    }
     waiting_.clear();
 }
 
-void FramePlacer::refuse(const FrameWitness& frame, const std::string& why) {
+void FramePlacer::refuse(const FrameWitness& frame, const Reason& why) {
     placements_.push_back({frame.arrival, {}, false, why});
 }
 
 std::vector<Placement> FramePlacer::take_placements() {
     return std::exchange(placements_, {});
+}
+
+std::vector<Reason> FramePlacer::drops_left(uint64_t disk_drops, uint64_t host_drops) {
+    return take_drops(trigger_count_, disk_drops, host_drops);
 }
 
 uint64_t FramePlacer::lowest_open() const {

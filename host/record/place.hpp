@@ -38,7 +38,7 @@ struct Placement {
     std::optional<uint64_t> arrival;  // of the frame
     std::optional<uint64_t> counter;  // of the trigger, as far as camera time tells
     bool accepted = false;
-    std::string why;  // not accepted
+    Reason why;  // not accepted
     Sight optical = Sight::silent;
 };
 
@@ -58,6 +58,9 @@ class FramePlacer {
 
     std::vector<Placement> take_placements();
 
+    // After end(): of the frames that were dropped by us, those that no gap between frames was found for.
+    std::vector<Reason> drops_left(uint64_t disk_drops, uint64_t host_drops);
+
     // Every frame still to be accepted has a counter of at least this.
     uint64_t lowest_open() const;
 
@@ -75,23 +78,27 @@ class FramePlacer {
         FrameWitness frame;
         uint64_t position = 0;    // on the stretch's grid
         bool begins_run = false;  // ids do not step here as times do
-        std::string gap;          // why triggers between the frame before and this one have no frame
+        std::vector<Reason>
+            gap;  // why triggers between the frame before and this one have no frame; the last is of all further
         Sight optical = Sight::silent;
     };
 
     void process(FrameWitness frame);
     bool append(FrameWitness& frame);
-    void begin_stretch(FrameWitness frame, const std::string& gap);
+    void begin_stretch(FrameWitness frame, Reason gap);
     void end_stretch();
     void end_run();
     void place(Pending pending);
     uint64_t triggers_until(uint64_t timestamp_ns) const;
     void try_lock();
-    void give_up_oldest(size_t count, const std::string& why);
+    std::vector<Reason> losses(const FrameWitness& frame, uint64_t steps, uint64_t id_steps);
+    std::vector<Reason> take_drops(uint64_t count, uint64_t disk_drops, uint64_t host_drops);
+    void give_up_oldest(size_t count, const Reason& why);
+    Reason nothing_fits() const;
     void examine(Pending pending);
     void accept_waiting();
-    void refuse_waiting(const std::string& why);
-    void refuse(const FrameWitness& frame, const std::string& why);
+    void refuse_waiting(const Reason& why);
+    void refuse(const FrameWitness& frame, const Reason& why);
     // The counter of position 0, or the least that it can be.
     uint64_t lowest_first_counter() const { return locked_ ? first_counter_ : next_counter_; }
     uint64_t counter_of(const Pending& pending) const { return first_counter_ + pending.position; }
@@ -106,6 +113,7 @@ class FramePlacer {
     uint64_t bound_arrivals_ = 0, bound_fired_ = 0;  // the last bound, for frames that are still on their way here
     std::vector<Placement> placements_;
     uint64_t duplicates_ = 0, camera_restarts_ = 0;
+    uint64_t disk_drops_ = 0, host_drops_ = 0;  // of those that frames told of, how many a gap was found for
 
     // The stretch.
     std::optional<TriggerGrid> grid_;

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Recorder: plays a sequence on the board, takes the camera's frames, and hands on each one with its slot.
+// Recorder: plays a sequence on the board, takes the cameras' frames, and hands on each one with its slot.
 #pragma once
 
 #include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "device/board.hpp"
 #include "device/camera.hpp"
+#include "record/clock_fit.hpp"
 #include "record/identify.hpp"
 #include "stage/sequence.hpp"
 #include "stage/stage.hpp"
 
 namespace ols {
 
-// Called from the thread that calls record_take. A sink that takes long holds up the camera, in the end: at most
+// One camera's share of a take. Called from that camera's thread. A sink that takes long holds up its camera, in the end: at most
 // frames_in_flight() frames are kept.
 struct RecordSink {
     // An identified frame; `tick` and the other fields of identification are set. The frame's memory is counted against
@@ -24,37 +26,59 @@ struct RecordSink {
     std::function<void(const MissingSlot&)> missing;
     std::function<void(uint64_t decided, uint64_t total)> progress;  // every trigger below `decided` has had its call
     size_t cycles_kept = 0;  // whose frames the sink holds besides the one being developed and the one being gathered
+    // Whether what holds frames waits for a disk, for the cause of those that are dropped meanwhile; from any thread.
+    std::function<bool()> waits_for_disk = {};
+};
+
+struct RecordedCamera {
+    Camera& camera;
+    uint32_t index = 0;                  // among the stage's
+    std::optional<double> black_counts;  // measured; without it, the one that each frame states
+    RecordSink sink;
+};
+
+// What became of one camera's frames.
+struct CameraReport {
+    uint32_t index = 0;   // among the stage's
+    CameraInfo camera;    // as it was set up
+    CameraCounts counts;  // of this take
+    uint64_t frames = 0, frames_discarded = 0, duplicates = 0, restarts = 0;
+    uint64_t stale_buffers = 0;          // frames with the samples of an earlier one, bit for bit
+    uint64_t frames_without_noise = 0;   // frames of which that cannot be told (frame_bits.hpp)
+    CauseCounts missing;                 // slots, by cause
+    std::optional<ClockRelation> clock;  // its own, of the identified frames
+    std::string unfit_frame;  // the first frame that was not of the stage's size or format; empty when there was none
+    Reason end;               // why it gave no more before it had delivered everything; empty when it had
 };
 
 struct RecordReport {
-    uint64_t frames = 0, frames_discarded = 0, duplicates = 0, camera_restarts = 0;
-    uint64_t slots_total = 0, slots_missing = 0;
-    uint64_t stale_buffers = 0;         // frames with the samples of an earlier one, bit for bit
-    uint64_t frames_without_noise = 0;  // frames of which that cannot be told (frame_bits.hpp)
-    CameraInfo camera;                  // as it was set up
-    CameraCounts camera_counts;         // of this take
-    double clock_drift_ppm = 0;
-    std::string unfit_frame;  // the first frame that was not of the stage's size or format; empty when there was none
-    std::string board_end;    // why the board's log ended before the sequence did; empty when it did not
-    std::string camera_end;   // why the camera gave no more before it had delivered everything; empty when it had
+    uint64_t slots_total = 0;  // of each camera
+    Reason board_end;          // why the board's log ended before the sequence did; empty when it did not
+    std::optional<ClockRelation> host_clock;  // this machine's steady clock
+    std::vector<CameraReport> cameras;        // in their order
+
+    CauseCounts missing() const {
+        CauseCounts sum;
+        for (const CameraReport& camera : cameras) sum.add(camera.missing);
+        return sum;
+    }
 };
 
-// Frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof), those
-// that the sink keeps besides, and two reorder windows.
+// A camera's frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof),
+// those that the sink keeps besides, and two reorder windows.
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
 
 // Loads, arms and starts the sequence as its playback says; after that the board plays, or waits for an edge. The error is the
 // board's own, or says what a latched fault was.
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage);
 
-// Sets the camera up as the stage's first [[camera]] says and starts it, loads the sequence, arms and starts the board, and
-// returns when every trigger is decided. `stop` ends it early, and so does a camera that fails: the board goes dark, what was
+// Sets the cameras up as the stage says and starts them, loads the sequence, arms and starts the board, and returns when every
+// trigger is decided for each camera. Each has its reader, its identification and its sink, in threads of its own: what one loses
+// the others do not. `stop` ends the take early, and so do the cameras when none of them is left: the board goes dark, what was
 // fired is still identified, the rest is missing.
-// Errors: the camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that fails later is no error here: what was proved
-// stands, the rest is missing and says why.
-// `black_counts` is the camera's measured black level; without it, the one that each frame states.
-Result<RecordReport> record_take(Board& board, Camera& camera, const Sequence& sequence, const StageConfig& stage,
-                                 std::optional<double> black_counts, const RecordSink& sink,
-                                 const std::atomic<bool>& stop);
+// Errors: a camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that
+// fails later is no error here: what was proved stands, the rest is missing and says why.
+Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
+                                 const StageConfig& stage, const std::atomic<bool>& stop);
 
 }  // namespace ols

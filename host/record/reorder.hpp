@@ -6,8 +6,8 @@
 #include <deque>
 #include <map>
 #include <optional>
-#include <string>
 
+#include "record/cause.hpp"
 #include "record/frame_summary.hpp"
 
 namespace ols {
@@ -16,9 +16,11 @@ namespace ols {
 struct FrameWitness {
     uint64_t arrival = 0;  // frames that arrived before it; the caller's name for it
     CameraStamp stamp;
-    std::string unfit;  // why its picture cannot be used, whatever its stamp says; empty: it can
+    Reason unfit;  // why its picture cannot be used, whatever its stamp says; empty: it can
     FrameSummary summary;
     uint64_t fired_before = UINT64_MAX;  // its trigger's counter is below this: what the board had fired by then
+    // Frames that had been dropped by us when this one was read, since the take began: because the disk was late, or all else.
+    uint64_t disk_drops = 0, host_drops = 0;
 
     uint32_t epoch = 0;  // how often the camera's count had started again; set by the window
 };

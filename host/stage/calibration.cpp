@@ -47,44 +47,38 @@ Image filled(const CameraConfig& camera, double value) {
 }  // namespace
 
 Result<Calibration> read_calibration(const std::string& folder, const StageConfig& stage) {
-    auto file = TomlSection::open(folder + "/calibration.toml");
-    if (!file.ok()) return fail(file.error().message + "; " + remedy);
-    CalibrationRecord record;
-    int cameras = 0;
-    file->read("cameras", cameras, 1, 1000);
-    file->read("card_reflectance", record.card_reflectance, 0, 1);
-    file->read("card_exposure_us", record.card_exposure_us, 0, 1e9);
-    file->read("frames", record.frames, 1, 1'000'000'000);
-    if (const Status status = file->finish(); !status.ok()) return status.error();
-    if (cameras != int(stage.cameras.size()))
-        return fail(fmt::format("'{}' calibrates {} cameras and the stage has {}: {}", folder, cameras,
-                                stage.cameras.size(), remedy));
     Calibration calibration{folder, {}};
     for (size_t c = 0; c < stage.cameras.size(); ++c) {
-        auto black = read_plane(camera_folder(folder, c) + "/black.exr", stage.cameras[c], -1e6f);
+        const std::string of_camera = camera_folder(folder, c);
+        auto file = TomlSection::open(of_camera + "/calibration.toml");
+        if (!file.ok())
+            return fail(fmt::format("camera {} is not calibrated: {}; {}", c, file.error().message, remedy));
+        CalibrationRecord record;
+        file->read("card_reflectance", record.card_reflectance, 0, 1);
+        file->read("card_exposure_us", record.card_exposure_us, 0, 1e9);
+        file->read("frames", record.frames, 1, 1'000'000'000);
+        if (const Status status = file->finish(); !status.ok()) return status.error();
+        auto black = read_plane(of_camera + "/black.exr", stage.cameras[c], -1e6f);
         if (!black.ok()) return black.error();
-        auto flat = read_plane(camera_folder(folder, c) + "/flat.exr", stage.cameras[c], 1e-9f);
+        auto flat = read_plane(of_camera + "/flat.exr", stage.cameras[c], 1e-9f);
         if (!flat.ok()) return flat.error();
         calibration.cameras.push_back({std::move(*black), std::move(*flat)});
     }
     return calibration;
 }
 
-Status write_calibration(const std::string& folder, const Calibration& calibration, const CalibrationRecord& record) {
+Status write_calibration(const std::string& folder, size_t camera, const CameraCalibration& calibration,
+                         const CalibrationRecord& record) {
+    const std::string of_camera = camera_folder(folder, camera), facts = of_camera + "/calibration.toml";
     std::error_code error;
-    std::filesystem::remove(folder + "/calibration.toml", error);
-    for (size_t c = 0; c < calibration.cameras.size(); ++c) {
-        const std::string camera = camera_folder(folder, c);
-        std::filesystem::create_directories(camera, error);
-        if (error) return fail(fmt::format("cannot make folder '{}': {}", camera, error.message()));
-        const CameraCalibration& planes = calibration.cameras[c];
-        if (Status s = write_exr(camera + "/black.exr", planes.black, ExrType::single_float); !s.ok()) return s;
-        if (Status s = write_exr(camera + "/flat.exr", planes.flat, ExrType::single_float); !s.ok()) return s;
-    }
-    return write_whole_file(
-        folder + "/calibration.toml",
-        fmt::format("cameras = {}\ncard_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
-                    calibration.cameras.size(), record.card_reflectance, record.card_exposure_us, record.frames));
+    std::filesystem::create_directories(of_camera, error);
+    if (error) return fail(fmt::format("cannot make folder '{}': {}", of_camera, error.message()));
+    std::filesystem::remove(facts, error);
+    if (error) return fail(fmt::format("cannot replace '{}': {}", facts, error.message()));
+    if (Status s = write_exr(of_camera + "/black.exr", calibration.black, ExrType::single_float); !s.ok()) return s;
+    if (Status s = write_exr(of_camera + "/flat.exr", calibration.flat, ExrType::single_float); !s.ok()) return s;
+    return write_whole_file(facts, fmt::format("card_reflectance = {}\ncard_exposure_us = {}\nframes = {}\n",
+                                               record.card_reflectance, record.card_exposure_us, record.frames));
 }
 
 Calibration nominal_calibration(const StageConfig& stage) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Calibration: what turns a camera's counts into reflectance, and its folder on disk.
 //
-//   calibration.toml        [[camera]] width, height, channels, and how they were measured
+//   cam0/calibration.toml   how it was measured; cam1/ ... are those of the stage's other cameras
 //   cam0/black.exr          counts without light, for each sample
 //   cam0/flat.exr           F, counts a microsecond that r = 1 gives under one lamp (docs/architecture.md, "Units")
 #pragma once
@@ -36,8 +36,10 @@ struct CalibrationRecord {
 // everywhere. Errors name the file and say to calibrate again.
 Result<Calibration> read_calibration(const std::string& folder, const StageConfig& stage);
 
-// Writes the folder; calibration.toml comes last, so that an interrupted one is not taken for a calibration.
-Status write_calibration(const std::string& folder, const Calibration& calibration, const CalibrationRecord& record);
+// Writes one camera's part of the folder; what is there of others stays. calibration.toml comes last, so that an interrupted one is
+// not taken for a calibration.
+Status write_calibration(const std::string& folder, size_t camera, const CameraCalibration& calibration,
+                         const CalibrationRecord& record);
 
 // Without a calibration: the black level and the gain that the stage states, the same for every sample.
 Calibration nominal_calibration(const StageConfig& stage);

@@ -21,17 +21,19 @@ struct Options {
 };
 
 Result<int> run(const Options& options) {
-    auto session = open_session(options.links);
+    auto session = open_session(options.links, options.card.camera);
     if (!session.ok()) return session.error();
     const auto card =
-        calibrate_with_card(*session->board, *session->camera, session->stage, options.card, stop_on_signal(),
+        calibrate_with_card(*session->board, *session->cameras[0], session->stage, options.card, stop_on_signal(),
                             [](uint64_t decided, uint64_t total) { show_progress("calibrating", decided, total); });
     if (!card.ok()) return card.error();
-    if (Status s = write_calibration(options.output, card->calibration, card->record); !s.ok()) return s.error();
+    if (Status s = write_calibration(options.output, options.card.camera, card->calibration, card->record); !s.ok())
+        return s.error();
     if (options.json) {
         const nlohmann::json json = {{"calibration", options.output},
                                      {"frames", card->record.frames},
-                                     {"slots_missing", card->report.slots_missing},
+                                     {"camera", options.card.camera},
+                                     {"slots_missing", card->report.missing().total()},
                                      {"exposure_us", card->record.card_exposure_us},
                                      {"black_counts", card->black_mean},
                                      {"flat_counts_per_us", card->flat_mean},
@@ -56,10 +58,15 @@ void add_calibrate_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Example: stagectl calibrate --stage examples/stage.toml --board socket:run/board.sock \\\n"
         "           --camera ring:run/cam0.ring --card 0.985 -o cal\n"
+        "         stagectl calibrate --number 1 ... -o cal     the second camera's, into the same folder\n"
         "The card stands at the stage's centre and faces the camera. All lamps flash; nothing is written when a sample "
         "saturates,\nthe card is too dark or does not fill the view.");
     options->links.add_to(*verb, true);
     verb->add_option("--card", options->card.reflectance, "reflectance of the card")->check(CLI::Range(0.01, 1.0));
+    verb->add_option("--number", options->card.camera,
+                     "which of the stage's cameras, from 0: each has the card face it in its turn, and its own part of "
+                     "the folder")
+        ->capture_default_str();
     verb->add_option("--exposure-us", options->card.exposure_us, "exposure; otherwise chosen from the camera's gain")
         ->check(CLI::Range(0.1, 400.0));
     verb->add_option("--cycles", options->card.cycles, "times 8 frames are averaged")->check(CLI::Range(1, 10'000));

@@ -52,9 +52,11 @@ Result<Sequence> compile(const Options& options, const StageConfig& stage) {
 }
 
 void follow(Board& board, const Sequence& sequence, const std::atomic<bool>& stop, bool json, Account& account) {
-    static const std::atomic<uint64_t> no_frames{0};
     const BoardLog log(
-        board, PlayBounds(sequence), no_frames, [&] { return std::string(stop ? "stopped by you" : ""); },
+        board, PlayBounds(sequence), [] { return std::vector<uint64_t>(); },
+        [&] {
+            return stop ? Reason{Cause::stopped, "stopped by you"} : Reason{};
+        },
         [&](const LogNews& news) { account.add(news, json); }, [&](LogEnd end) { account.end = std::move(end); });
     // Its destructor waits for the end.
 }
@@ -72,8 +74,8 @@ Result<int> run(const Options& options) {
     Account account;
     follow(*board, *sequence, stop, options.json, account);
     if (account.end.is_lost)
-        return fail(
-            fmt::format("{}; after {} triggers the board's log could not be read", account.end.why, account.triggers));
+        return fail(fmt::format("{}; after {} triggers the board's log could not be read", account.end.why.text,
+                                account.triggers));
     const auto status = board->status();
     if (!status.ok()) return status.error();
     fmt::print(stderr, "{} triggers", account.triggers);
@@ -82,7 +84,7 @@ Result<int> run(const Options& options) {
         fmt::print(stderr, "; {} edges, {} of them missed", uint32_t(status->edges_seen),
                    uint32_t(status->edges_missed));
     fmt::print(stderr, "\n");
-    if (!account.end.why.empty() && !stop) return fail(account.end.why);
+    if (!account.end.why.empty() && !stop) return fail(account.end.why.text);
     return account.unseen() ? 2 : 0;
 }
 

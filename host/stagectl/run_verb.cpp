@@ -8,7 +8,7 @@
 #include "image/line_file.hpp"
 #include "image/outputs.hpp"
 #include "program.hpp"
-#include "record/camera_record.hpp"
+#include "record/record_json.hpp"
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
@@ -81,20 +81,9 @@ nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
 
 // The first archive's account with the recording's; those of --also in "also".
 nlohmann::json to_json(const TakeReport& report, const std::vector<Planned>& planned) {
-    const RecordReport& record = report.record;
     nlohmann::json json = to_json(report.outputs[0], planned[0].path);
-    json.update({{"slots_total", record.slots_total},
-                 {"slots_missing", record.slots_missing},
-                 {"frames", record.frames},
-                 {"frames_discarded", record.frames_discarded},
-                 {"camera", camera_record(record.camera, record.camera_counts)},
-                 {"duplicates", record.duplicates},
-                 {"stale_buffers", record.stale_buffers},
-                 {"frames_without_noise", record.frames_without_noise},
-                 {"camera_restarts", record.camera_restarts},
-                 {"clock_drift_ppm", record.clock_drift_ppm},
-                 {"board_end", record.board_end},
-                 {"camera_end", record.camera_end}});
+    json.update(record_json(report.record));
+    json["host_clock"] = report.record.host_clock ? clock_record(*report.record.host_clock) : nlohmann::json();
     json["seconds"]["total"] = report.seconds_total;
     for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));
     return json;
@@ -119,23 +108,34 @@ void print_output(const OutputReport& report, const std::string& folder, const O
     if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
 }
 
+void print_camera(const CameraReport& camera, const std::string& name) {
+    if (!camera.end.empty())
+        fmt::print(stderr, "stagectl: {}{} ({})\n", name, camera.end.text, cause_words(camera.end.cause));
+    if (camera.missing.total() > 0)
+        fmt::print(stderr, "stagectl: {}{} slots missing: {}\n", name, camera.missing.total(),
+                   camera.missing.to_words());
+    if (camera.stale_buffers > 0)
+        fmt::print(stderr,
+                   "stagectl: {}{} frames had the samples of an earlier one, bit for bit; their slots are missing: the "
+                   "camera's driver or grabber hands out old buffers\n",
+                   name, camera.stale_buffers);
+    if (!camera.unfit_frame.empty())
+        fmt::print(stderr, "stagectl: {}frames came as {}, which is not what the stage says of its camera\n", name,
+                   camera.unfit_frame);
+}
+
 void print_report(const TakeReport& report, bool is_estimate, const std::vector<Planned>& planned,
                   const Options& options) {
     const RecordReport& record = report.record;
+    const uint64_t missing = record.missing().total();
     for (size_t n = 0; n < planned.size(); ++n) print_output(report.outputs[n], planned[n].archive.folder(), options);
     if (!options.json)
-        fmt::print("{} of {} slots missing; {:.1f} s\n", record.slots_missing, record.slots_total,
+        fmt::print("{} of {} slots missing; {:.1f} s\n", missing, record.slots_total * record.cameras.size(),
                    report.seconds_total);
-    if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
-    if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
-    if (record.stale_buffers > 0)
-        fmt::print(stderr,
-                   "stagectl: {} frames had the samples of an earlier one, bit for bit; their slots are missing: the "
-                   "camera's driver or grabber hands out old buffers\n",
-                   record.stale_buffers);
-    if (!record.unfit_frame.empty())
-        fmt::print(stderr, "stagectl: frames came as {}, which is not what the stage says of its camera\n",
-                   record.unfit_frame);
+    if (!record.board_end.empty())
+        fmt::print(stderr, "stagectl: {} ({})\n", record.board_end.text, cause_words(record.board_end.cause));
+    for (const CameraReport& camera : record.cameras)
+        print_camera(camera, record.cameras.size() > 1 ? fmt::format("camera {}: ", camera.index) : "");
     if (report.outputs[0].saturated_share > 0)
         fmt::print(stderr,
                    "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
@@ -144,8 +144,9 @@ void print_report(const TakeReport& report, bool is_estimate, const std::vector<
     if (is_estimate)
         fmt::print(stderr,
                    "stagectl: the basis has fewer independent rows than lamps: what was written is an estimate\n");
-    if (record.slots_missing > 0)
-        fmt::print(stderr, "stagectl: why slots are missing stands in {}/manifest.json, identification.missing\n",
+    if (missing > 0)
+        fmt::print(stderr,
+                   "stagectl: why slots are missing stands in {}/manifest.json, identification.cameras[].missing\n",
                    planned[0].archive.folder());
 }
 
@@ -274,7 +275,9 @@ Result<int> run(const Options& options) {
                     },
                     [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }};
     for (Planned& one : *planned) sinks.outputs.push_back({one.archive, one.targets});
-    const auto report = run_take(take, {*session->board, {session->camera.get()}}, sinks, stop_on_signal());
+    std::vector<Camera*> cameras;
+    for (const auto& camera : session->cameras) cameras.push_back(camera.get());
+    const auto report = run_take(take, {*session->board, cameras}, sinks, stop_on_signal());
     if (!report.ok()) return report.error();
     print_report(*report, sequence->basis.is_estimate, *planned, options);
     if (options.json) print_json(to_json(*report, *planned));
@@ -286,7 +289,7 @@ Result<int> run(const Options& options) {
         if (!output.write_error.empty()) return 1;
         missing += output.targets_missing;
     }
-    return missing > 0 || report->record.slots_missing > 0 ? 2 : 0;
+    return missing > 0 || report->record.missing().total() > 0 ? 2 : 0;
 }
 
 }  // namespace

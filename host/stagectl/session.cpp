@@ -46,6 +46,31 @@ Result<Board> connect_board(const std::string& link, const LinkOptions& options)
     return Board::connect(std::move(*transfer), patience);
 }
 
+// The number and source of each camera to open.
+Result<std::vector<std::pair<uint32_t, std::string>>> camera_sources(const LinkOptions& options,
+                                                                     const StageConfig& stage,
+                                                                     std::optional<uint32_t> only) {
+    const size_t count = stage.cameras.size();
+    if (only && *only >= count)
+        return fail(fmt::format("there is no camera {}: the stage has 0 to {}", *only, count - 1));
+    if (!options.cameras.empty() && options.cameras.size() != (only ? 1 : count))
+        return fail(
+            fmt::format("--camera is given {} times and {} {} to be opened: give one source for each, in the order "
+                        "of the stage's [[camera]]",
+                        options.cameras.size(), only ? 1 : count, only || count == 1 ? "camera is" : "cameras are"));
+    std::vector<std::pair<uint32_t, std::string>> sources;
+    for (uint32_t c = only.value_or(0); c < (only ? *only + 1 : count); ++c) {
+        const std::string& source = options.cameras.empty() ? stage.cameras[c].source : options.cameras[only ? 0 : c];
+        if (source.empty()) return fail("which camera? give --camera, or a source in the stage's [[camera]]");
+        for (const auto& [number, earlier] : sources)
+            if (earlier == source)
+                return fail(
+                    fmt::format("cameras {} and {} are both {}: each needs a source of its own", number, c, source));
+        sources.emplace_back(c, source);
+    }
+    return sources;
+}
+
 Error which_board() {
     return fail("which board? give --board, or a link in the stage's [board]");
 }
@@ -58,7 +83,11 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
         "--board", board,
         "the board, usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera)
-        verb.add_option("--camera", camera, "the camera, v4l2:/dev/video0, ring:PATH or fake:RATE; otherwise stage.toml's camera source");
+        verb.add_option("--camera", cameras,
+                        "the camera, v4l2:/dev/video0, ring:PATH or fake:RATE; once for each [[camera]] of the stage, "
+                        "in their order; "
+                        "otherwise stage.toml's camera sources")
+            ->allow_extra_args(false);
     verb.add_option("--wait", wait_s,
                     "seconds to wait for what is not there yet, as a virtual stage that still renders")
         ->check(CLI::NonNegativeNumber);
@@ -79,25 +108,25 @@ Result<Board> open_board(const LinkOptions& options, const StageConfig& stage) {
     return open_within(options.wait_s, [&] { return connect_board(link, options); });
 }
 
-Result<StageSession> open_session(const LinkOptions& options) {
+Result<StageSession> open_session(const LinkOptions& options, std::optional<uint32_t> only) {
     auto stage = open_stage(options);
     if (!stage.ok()) return stage.error();
-    if (stage->cameras.size() != 1)
-        return fail(
-            fmt::format("the stage has {} cameras and a take is recorded from one: keep one [[camera]] in "
-                        "the stage",
-                        stage->cameras.size()));
-    const std::string source = options.camera.empty() ? stage->cameras[0].source : options.camera;
-    if (source.empty()) return fail("which camera? give --camera, or a source in the stage's [[camera]]");
+    const auto sources = camera_sources(options, *stage, only);
+    if (!sources.ok()) return sources.error();
     const std::string link = board_link(options, *stage);
     if (link.empty()) return which_board();
-    // Both anew at each try: a ring that an earlier virtual stage left behind is not the one that comes with the board.
+    // All anew at each try: a ring that an earlier virtual stage left behind is not the one that comes with the board.
     return open_within(options.wait_s, [&]() -> Result<StageSession> {
-        auto camera = open_camera(source);
-        if (!camera.ok()) return camera.error();
+        StageSession session{*stage, nullptr, {}};
+        for (const auto& [index, source] : *sources) {
+            auto camera = open_camera(source, index);
+            if (!camera.ok()) return camera.error();
+            session.cameras.push_back(std::move(*camera));
+        }
         auto board = connect_board(link, options);
         if (!board.ok()) return board.error();
-        return StageSession{*stage, std::make_unique<Board>(std::move(*board)), std::move(*camera)};
+        session.board = std::make_unique<Board>(std::move(*board));
+        return session;
     });
 }
 

@@ -5,7 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "device/board.hpp"
 #include "device/camera.hpp"
@@ -15,7 +17,8 @@ namespace ols {
 
 // --stage, --board, --camera, --wait and --patience.
 struct LinkOptions {
-    std::string stage_path, board, camera;
+    std::string stage_path, board;
+    std::vector<std::string> cameras;  // sources, in the order of the stage's
     double wait_s = 0;
     double patience_s = Patience::exchange_ms / 1e3;
 
@@ -25,7 +28,7 @@ struct LinkOptions {
 struct StageSession {
     StageConfig stage;
     std::unique_ptr<Board> board;
-    std::unique_ptr<Camera> camera;
+    std::vector<std::unique_ptr<Camera>> cameras;  // in the order asked for
 };
 
 // The default stage without --stage.
@@ -33,7 +36,8 @@ Result<StageConfig> open_stage(const LinkOptions& options);
 
 // Options win over stage.toml. Errors say which of them is missing. What is not there yet is tried again until wait_s is over.
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage);
-Result<StageSession> open_session(const LinkOptions& options);
+// Opens the stage's cameras, or only the one of a number.
+Result<StageSession> open_session(const LinkOptions& options, std::optional<uint32_t> only = {});
 
 // Turns true at the first SIGINT or SIGTERM, which also ends every wait for the board within Patience::stop_ms; the second ends
 // the program at once.

@@ -54,7 +54,7 @@ void CameraDeveloper::add_frame(std::shared_ptr<const Frame> frame) {
 
 CameraDeveloper::Job CameraDeveloper::gather(size_t index) const {
     const auto& [target, frames] = plan_[index];
-    std::string lost_by = missing_.cause_within(frames.first, frames.last);
+    Reason lost_by = missing_.cause_within(frames.first, frames.last);
     if (is_performance_) return {uint32_t(index), store_.around(uint32_t(index), target), std::move(lost_by)};
     return {uint32_t(index), store_.cycle(uint32_t(target), take_.masks.fill_from_neighbours), std::move(lost_by)};
 }
@@ -75,8 +75,8 @@ void CameraDeveloper::hand_on(uint64_t decided) {
 }
 
 // A take that ends early may have lost millions of targets: they are noted in runs.
-void CameraDeveloper::lose(size_t first, size_t last, const std::string& lost_by) {
-    const std::string why = "no frame of it was recorded: " + (lost_by.empty() ? "the take ended" : lost_by);
+void CameraDeveloper::lose(size_t first, size_t last, const Reason& lost_by) {
+    const std::string why = "no frame of it was recorded: " + (lost_by.empty() ? "the take ended" : lost_by.text);
     if (lost_ && lost_->why != why) flush_lost();
     if (!lost_) lost_ = LostTargets{camera_, uint32_t(first), uint32_t(last), why};
     lost_->last = uint32_t(last);
@@ -89,7 +89,7 @@ void CameraDeveloper::flush_lost() {
 
 CameraDeveloper::Report CameraDeveloper::finish() {
     if (!thread_.joinable()) return report_;
-    if (next_ < plan_.size()) lose(next_, plan_.size() - 1, "");
+    if (next_ < plan_.size()) lose(next_, plan_.size() - 1, {});
     flush_lost();
     work_.close();
     thread_.join();
@@ -118,7 +118,7 @@ TargetOutcome CameraDeveloper::develop(const Job& job) {
                           [&] { return std::visit([&](const auto& frames) { return develop(frames); }, job.frames); });
     if (!target.ok()) {
         outcome.why = target.error().message;
-        if (!job.lost_by.empty()) outcome.why += "; the first was lost because: " + job.lost_by;
+        if (!job.lost_by.empty()) outcome.why += "; the first was lost because: " + job.lost_by.text;
         return outcome;
     }
     outcome.target = std::make_unique<Target>(std::move(*target));

@@ -45,11 +45,11 @@ class CameraDeveloper {
     struct Job {
         uint32_t index = 0;
         std::variant<CycleFrames, TargetFrames> frames;
-        std::string lost_by;  // why the first of its slots that is missing is; "" when none is
+        Reason lost_by;  // why the first of its slots that is missing is; empty when none is
     };
 
     Job gather(size_t index) const;
-    void lose(size_t first, size_t last, const std::string& lost_by);
+    void lose(size_t first, size_t last, const Reason& lost_by);
     void flush_lost();
     void develop();
     TargetOutcome develop(const Job& job);

@@ -17,8 +17,7 @@ constexpr double least_share = 0.1;       // below, the flat would be mostly noi
 constexpr double least_of_median = 0.05;  // a sample darker than this beside the median does not see the card
 
 // Light on a surface that faces the camera, in units of one lamp that faces it.
-double light_on_card(const StageConfig& stage) {
-    const CameraConfig& camera = stage.cameras[0];
+double light_on_card(const StageConfig& stage, const CameraConfig& camera) {
     const auto vec = [](const std::array<double, 3>& a) { return Vec3{a[0], a[1], a[2]}; };
     const Vec3 normal = normalized(vec(camera.position_m) - vec(camera.look_at_m));
     double sum = 0;
@@ -28,8 +27,8 @@ double light_on_card(const StageConfig& stage) {
 
 double exposure_for(const StageConfig& stage, const CardOptions& options) {
     if (options.exposure_us > 0) return options.exposure_us;
-    const CameraConfig& camera = stage.cameras[0];
-    const double counts_per_us = camera.counts_per_us * options.reflectance * light_on_card(stage);
+    const CameraConfig& camera = stage.cameras[options.camera];
+    const double counts_per_us = camera.counts_per_us * options.reflectance * light_on_card(stage, camera);
     return share_of_range * (camera.white - camera.black) / counts_per_us;
 }
 
@@ -56,7 +55,7 @@ Sequence card_sequence(const StageConfig& stage, const CardOptions& options) {
         const double exposure_us = kind == T ? sequence.config.tracking_exposure_us : sequence.config.basis_exposure_us;
         slot.exposure_ticks = uint32_t(std::lround(exposure_us * double(ticks_per_us)));
         slot.period_ticks = uint32_t(double(tick_hz) / sequence.config.frame_rate_hz);
-        slot.trigger_mask = uint8_t(1 | 1 << stage.cameras[0].trigger);
+        slot.trigger_mask = uint8_t(1 | 1 << stage.cameras[options.camera].trigger);
         sequence.slots.push_back(std::move(slot));
     }
     return sequence;
@@ -129,7 +128,7 @@ Status check_card(const Average& card, const Image& above_black, double range, d
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
                                             const CardOptions& options, const std::atomic<bool>& stop,
                                             const std::function<void(uint64_t, uint64_t)>& progress) {
-    const CameraConfig& config = stage.cameras[0];
+    const CameraConfig& config = stage.cameras[options.camera];
     const Sequence sequence = card_sequence(stage, options);
     Average card(config), dark(config);
     const RecordSink sink{[&](std::shared_ptr<const Frame> frame) {
@@ -138,14 +137,14 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
                               if (kind == SlotKind::dark) dark.add(*frame);
                           },
                           [](const MissingSlot&) {}, progress};
-    const auto report = record_take(board, camera, sequence, stage, std::nullopt, sink, stop);
+    const auto report = record_take(board, {{camera, options.camera, std::nullopt, sink}}, sequence, stage, stop);
     if (!report.ok()) return report.error();
     if (card.frames() == 0 || dark.frames() == 0)
-        return fail(fmt::format("{} of {} frames could be identified, not enough to calibrate{}{}{}",
-                                card.frames() + dark.frames(), report->slots_total,
-                                report->camera_end.empty() ? "" : "; " + report->camera_end,
-                                report->board_end.empty() ? "" : "; " + report->board_end,
-                                report->unfit_frame.empty() ? "" : "; frames came as " + report->unfit_frame));
+        return fail(fmt::format(
+            "{} of {} frames could be identified, not enough to calibrate{}{}{}", card.frames() + dark.frames(),
+            report->slots_total, report->cameras[0].end.empty() ? "" : "; " + report->cameras[0].end.text,
+            report->board_end.empty() ? "" : "; " + report->board_end.text,
+            report->cameras[0].unfit_frame.empty() ? "" : "; frames came as " + report->cameras[0].unfit_frame));
 
     const double exposure_us = double(sequence.slots[2].exposure_ticks) / double(ticks_per_us);
     CameraCalibration planes{dark.mean(), card.mean()};
@@ -154,7 +153,7 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
     const double range = config.white - config.black;
     if (const Status status = check_card(card, flat, range, exposure_us); !status.ok()) return status.error();
     const float brightest = *std::max_element(flat.data.begin(), flat.data.end());
-    const double light = exposure_us * options.reflectance * light_on_card(stage);
+    const double light = exposure_us * options.reflectance * light_on_card(stage, config);
     for (float& value : flat.data) value = float(value / light);
 
     CardCalibration result;
@@ -163,8 +162,7 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
     result.black_mean = mean_of(planes.black);
     result.flat_mean = mean_of(planes.flat);
     result.brightest = brightest / range;
-    result.calibration.source = "card";
-    result.calibration.cameras.push_back(std::move(planes));
+    result.calibration = std::move(planes);
     return result;
 }
 

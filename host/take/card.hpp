@@ -13,10 +13,11 @@ struct CardOptions {
     double reflectance = 0.985;  // of the card
     double exposure_us = 0;      // 0: such that a card facing the camera reaches 60 % of the range
     int cycles = 16;             // of 8 card and 8 dark frames each
+    uint32_t camera = 0;         // which of the stage's
 };
 
 struct CardCalibration {
-    Calibration calibration;
+    CameraCalibration calibration;
     CalibrationRecord record;
     RecordReport report;
     double black_mean = 0, flat_mean = 0;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "record/camera_record.hpp"
+#include "record/record_json.hpp"
 
 namespace ols {
 
@@ -91,24 +91,13 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
 }
 
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
-                             const RecordReport& record, const nlohmann::json& missing) {
+                             const RecordReport& record, const std::vector<nlohmann::json>& missing) {
+    nlohmann::json identification = record_json(record);
+    for (size_t n = 0; n < missing.size(); ++n) identification["cameras"][n]["missing"] = missing[n];
     nlohmann::json json = {{"sequence", describe_sequence(take.sequence)},
                            {"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}},
                            {"calibration", take.calibration.source},
-                           {"identification",
-                            {{"slots_total", record.slots_total},
-                             {"slots_missing", record.slots_missing},
-                             {"missing", missing},
-                             {"frames", record.frames},
-                             {"frames_discarded", record.frames_discarded},
-                             {"duplicates", record.duplicates},
-                             {"stale_buffers", record.stale_buffers},
-                             {"frames_without_noise", record.frames_without_noise},
-                             {"camera_restarts", record.camera_restarts},
-                             {"clock_drift_ppm", record.clock_drift_ppm},
-                             {"board_end", record.board_end},
-                             {"camera_end", record.camera_end},
-                             {"camera", camera_record(record.camera, record.camera_counts)}}}};
+                           {"identification", std::move(identification)}};
     if (targets.every > 0) json["motion"] = describe_motion(take.sequence, targets);
     return json;
 }

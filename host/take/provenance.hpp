@@ -14,8 +14,9 @@ namespace ols {
 nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence);
 nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequence);
 
-// Of the take, for the manifest's `extra`. `missing`: one account (missing_ranges.hpp) a camera.
+// Of the take, for the manifest's `extra`. `missing`: one account (missing_ranges.hpp) for each of
+// the record's cameras.
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
-                             const RecordReport& record, const nlohmann::json& missing);
+                             const RecordReport& record, const std::vector<nlohmann::json>& missing);
 
 }  // namespace ols

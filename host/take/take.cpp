@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <numeric>
 
 #include "take/camera_developer.hpp"
@@ -26,32 +28,53 @@ size_t cycles_kept(const TakeMasks& masks, const std::vector<TakeOutput>& output
     return masks.fill_from_neighbours ? 2 : 0;
 }
 
-// An archive that is being made of the recording.
+// An archive that is being made of the recording: each camera's frames are developed beside the others', and one writes.
 class Output {
   public:
     Output(const TakeDescription& take, const TakeOutput& output)
-        : archive_(output.archive),
-          targets_(output.targets),
-          writer_(output.archive),
-          developer_(take, targets_, 0, writer_) {}
+        : archive_(output.archive), targets_(output.targets), writer_(output.archive) {
+        for (uint32_t camera = 0; camera < take.stage.cameras.size(); ++camera)
+            developers_.emplace_back(take, targets_, camera, writer_);
+    }
 
-    Status begin() { return archive_.expect_targets(0, uint32_t(developer_.target_count())); }
+    Status begin() {
+        for (uint32_t camera = 0; camera < developers_.size(); ++camera)
+            if (const Status expected = archive_.expect_targets(camera, uint32_t(developers_[camera].target_count()));
+                !expected.ok())
+                return expected;
+        return Done{};
+    }
     void take_place() { writer_.take_place(); }
-    CameraDeveloper& developer() { return developer_; }
+    CameraDeveloper& developer(size_t camera) { return developers_[camera]; }
+    bool waits_for_disk() const { return writer_.is_awaited(); }
 
     // Waits until everything is developed and written.
     OutputReport wait() {
-        const CameraDeveloper::Report developed = developer_.finish();
+        OutputReport report;
+        for (CameraDeveloper& developer : developers_) {
+            const CameraDeveloper::Report developed = developer.finish();
+            report.saturated_share = std::max(report.saturated_share, developed.saturated_share);
+            report.estimated_share = std::max(report.estimated_share, developed.estimated_share);
+            report.unsolved_share = std::max(report.unsolved_share, developed.unsolved_share);
+            report.misaligned_share = std::max(report.misaligned_share, developed.misaligned_share);
+            report.seconds_develop += developed.seconds;
+            report.seconds_motion.flow += developed.seconds_motion.flow;
+            report.seconds_motion.planes += developed.seconds_motion.planes;
+            report.seconds_motion.invert += developed.seconds_motion.invert;
+            report.seconds_motion.matte += developed.seconds_motion.matte;
+        }
         const TargetWriter::Report written = writer_.finish();
-        return {written.written,           written.missing,
-                developed.saturated_share, developed.estimated_share,
-                developed.unsolved_share,  developed.misaligned_share,
-                developed.seconds,         written.seconds,
-                developed.seconds_motion,  written.error};
+        report.targets_written = written.written;
+        report.targets_missing = written.missing;
+        report.seconds_write = written.seconds;
+        report.write_error = written.error;
+        return report;
     }
 
     Status finish(const TakeDescription& take, const Board& board, const RecordReport& record) {
-        archive_.add_to_manifest(describe_take(take, targets_, board, record, developer_.missing_json()));
+        std::vector<nlohmann::json> missing;
+        for (const CameraDeveloper& developer : developers_) missing.push_back(developer.missing_json());
+        archive_.add_to_manifest(describe_take(take, targets_, board, record, missing));
         return archive_.finish();
     }
 
@@ -59,60 +82,95 @@ class Output {
     ArchiveWriter& archive_;
     const TakeTargets targets_;
     TargetWriter writer_;
-    CameraDeveloper developer_;
+    std::deque<CameraDeveloper> developers_;  // of the stage's cameras
 };
+
+// What one camera's frames become, in every output.
+RecordSink sink_of(size_t camera, const std::vector<std::unique_ptr<Output>>& outputs, size_t kept,
+                   std::function<void(const Frame&)> identified,
+                   std::function<void(uint64_t decided, uint64_t total)> progress) {
+    return {[=, &outputs](const std::shared_ptr<const Frame>& frame) {
+                identified(*frame);
+                for (const auto& output : outputs) output->developer(camera).add_frame(frame);
+            },
+            [=, &outputs](const MissingSlot& slot) {
+                for (const auto& output : outputs) output->developer(camera).add_missing(slot);
+            },
+            [=, &outputs](uint64_t decided, uint64_t total) {
+                for (const auto& output : outputs) output->developer(camera).hand_on(decided);
+                progress(decided, total);
+            },
+            kept,
+            [&outputs] {
+                return std::ranges::any_of(outputs, [](const auto& output) { return output->waits_for_disk(); });
+            }};
+}
 
 // Why a take has not one frame; nothing is kept of it.
 Error nothing_came(const RecordReport& record) {
     std::string why = "not one frame has its slot, and nothing is kept of the take";
-    for (const std::string& end : {record.camera_end, record.board_end})
-        if (!end.empty()) why += ": " + end;
-    if (!record.unfit_frame.empty())
-        why += fmt::format(": frames came as {}, which is not what the stage says of its camera", record.unfit_frame);
-    else if (record.frames > 0)
-        why += fmt::format(": {} frames came, and none fits the board's triggers", record.frames);
-    else if (record.board_end.empty() && record.camera_end.empty())
-        why += ": no frame came; check the camera, its trigger cable and that its source is this one";
+    if (!record.board_end.empty()) why += ": " + record.board_end.text;
+    for (const CameraReport& camera : record.cameras) {
+        if (record.cameras.size() > 1) why += fmt::format("; camera {}", camera.index);
+        if (!camera.end.empty()) why += ": " + camera.end.text;
+        if (!camera.unfit_frame.empty())
+            why +=
+                fmt::format(": frames came as {}, which is not what the stage says of its camera", camera.unfit_frame);
+        else if (camera.missing.of(Cause::no_light) > 0)
+            why +=
+                fmt::format(": {} frames came, and none shows any light: check the lamps' supply, the lens and its cap",
+                            camera.frames);
+        else if (camera.frames > 0)
+            why += fmt::format(": {} frames came, and none fits the board's triggers", camera.frames);
+        else if (record.board_end.empty() && camera.end.empty())
+            why += ": no frame came; check the camera, its trigger cable and that its source is this one";
+    }
     return fail(why);
 }
 
 }  // namespace
 
-std::optional<double> measured_black(const Calibration& calibration) {
+std::optional<double> measured_black(const Calibration& calibration, size_t camera) {
     if (calibration.source == "nominal") return std::nullopt;
-    const auto& black = calibration.cameras[0].black.data;
+    const auto& black = calibration.cameras[camera].black.data;
     return std::accumulate(black.begin(), black.end(), 0.0) / double(black.size());
 }
 
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
                             const std::atomic<bool>& stop) {
-    if (devices.cameras.size() != 1 || take.stage.cameras.size() != 1)
+    const size_t cameras = devices.cameras.size();
+    if (cameras == 0 || cameras != take.stage.cameras.size())
         return fail(
-            fmt::format("a take is recorded from one camera, and there are {}: keep one [[camera]] in the stage",
-                        take.stage.cameras.size()));
+            fmt::format("the stage has {} cameras, and {} are there: a take needs them all, or a stage without "
+                        "the others' [[camera]]",
+                        take.stage.cameras.size(), cameras));
     const auto start = std::chrono::steady_clock::now();
     std::vector<std::unique_ptr<Output>> outputs;
     for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output));
     for (const auto& output : outputs)
         if (const auto begun = output->begin(); !begun) return begun.error();
+
+    std::mutex mutex;  // of what the cameras' threads share
     bool has_frame = false;
-    const RecordSink sink{[&](const std::shared_ptr<const Frame>& frame) {
-                              if (!std::exchange(has_frame, true))
-                                  for (const auto& output : outputs) output->take_place();
-                              sinks.identified(*frame);
-                              for (const auto& output : outputs) output->developer().add_frame(frame);
-                          },
-                          [&](const MissingSlot& slot) {
-                              for (const auto& output : outputs) output->developer().add_missing(slot);
-                          },
-                          [&](uint64_t decided, uint64_t total) {
-                              for (const auto& output : outputs) output->developer().hand_on(decided);
-                              sinks.progress(decided, total);
-                          },
-                          cycles_kept(take.masks, sinks.outputs)};
+    std::vector<uint64_t> decided(cameras, 0);
+    const auto identified = [&](const Frame& frame) {
+        const std::lock_guard lock(mutex);
+        if (!std::exchange(has_frame, true))
+            for (const auto& output : outputs) output->take_place();
+        sinks.identified(frame);
+    };
+    std::vector<RecordedCamera> recorded;
+    for (size_t camera = 0; camera < cameras; ++camera) {
+        const auto progress = [&, camera](uint64_t done, uint64_t total) {
+            const std::lock_guard lock(mutex);
+            decided[camera] = done;
+            sinks.progress(*std::ranges::min_element(decided), total);
+        };
+        recorded.push_back({*devices.cameras[camera], uint32_t(camera), measured_black(take.calibration, camera),
+                            sink_of(camera, outputs, cycles_kept(take.masks, sinks.outputs), identified, progress)});
+    }
     TakeReport report;
-    const auto record = record_take(devices.board, *devices.cameras[0], take.sequence, take.stage,
-                                    measured_black(take.calibration), sink, stop);
+    const auto record = record_take(devices.board, recorded, take.sequence, take.stage, stop);
     for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);

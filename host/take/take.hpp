@@ -55,7 +55,7 @@ struct TakeOutput {
 // Where it goes.
 struct TakeSinks {
     std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
-    std::function<void(const Frame&)> identified;                    // every frame that has its slot
+    std::function<void(const Frame&)> identified;                    // every frame that has its slot; one at a time
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
 };
 
@@ -76,16 +76,16 @@ struct TakeReport {
     double seconds_total = 0;
 };
 
-// Threads: the camera's, the board's, the caller's, which identifies and calls the sinks, and for each output one that develops
-// and one that writes. Each hands on one thing at a time, and developing runs on all processors; memory is bounded by
-// frames_in_flight() frames and two targets an output. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
+// Threads: the board's; for each camera one that reads, one that identifies, and for each output one that develops; and for each
+// output one that writes. Each hands on one thing at a time, and developing runs on all processors; memory is bounded by
+// frames_in_flight() frames a camera and two targets an output and camera. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
 // Every target that was to come is in the archive's journal at the end, finished or missing with its reason.
-// Errors: as many cameras as the recorder takes (one) were not given; the board cannot be started; not one frame came. Then there
+// Errors: the stage's cameras were not all given; a camera or the board cannot be started; not one frame came. Then there
 // is no archive. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
                             const std::atomic<bool>& stop);
 
-// The mean black level of a calibration, for the optical code; nothing for a nominal one.
-std::optional<double> measured_black(const Calibration& calibration);
+// The mean black level of a camera's calibration, for the optical code; nothing for a nominal one.
+std::optional<double> measured_black(const Calibration& calibration, size_t camera);
 
 }  // namespace ols

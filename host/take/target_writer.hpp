@@ -2,6 +2,7 @@
 // Target writer: the thread that writes what developing made into the archive, and notes what it could not make.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
@@ -38,9 +39,12 @@ class TargetWriter {
     ~TargetWriter() { (void)finish(); }
 
     // Each waits while the one before the last is written. Outcomes of one camera come in order.
-    void take_place() { work_.push(TakePlace{}); }
-    void add(TargetOutcome outcome) { work_.push(std::move(outcome)); }
-    void add(LostTargets run) { work_.push(std::move(run)); }
+    void take_place() { push(TakePlace{}); }
+    void add(TargetOutcome outcome) { push(std::move(outcome)); }
+    void add(LostTargets run) { push(std::move(run)); }
+
+    // Whether somebody waits for what is being written.
+    bool is_awaited() const { return waiting_ > 0; }
 
     // Waits until all is written.
     Report finish();
@@ -49,6 +53,11 @@ class TargetWriter {
     struct TakePlace {};
     using Work = std::variant<TakePlace, TargetOutcome, LostTargets>;
 
+    void push(Work work) {
+        ++waiting_;
+        work_.push(std::move(work));
+        --waiting_;
+    }
     void write();
     Status write(TakePlace) { return archive_.take_place(); }
     Status write(const TargetOutcome& outcome);
@@ -57,6 +66,7 @@ class TargetWriter {
     ArchiveWriter& archive_;
     Report report_;  // the thread's until it has ended
     EventQueue<Work> work_{1};
+    std::atomic<int> waiting_ = 0;
     std::thread thread_;
 };
 

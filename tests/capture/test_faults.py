@@ -14,6 +14,7 @@ from virtual_take import (
     VirtualStage,
     identification,
     manifest,
+    missing_slots,
     missing_triggers,
     read_lamps,
     read_plane,
@@ -74,14 +75,14 @@ def expect_same(archive, clean, index, missing_lamps=()):
 @pytest.mark.parametrize(
     "fault, lost",
     [
-        ({"kind": "drop_frame"}, True),
-        ({"kind": "drop_trigger"}, True),
-        ({"kind": "wrong_size"}, True),
-        ({"kind": "late", "by": 40}, True),
-        ({"kind": "duplicate"}, False),
-        ({"kind": "late", "by": 10}, False),
-        ({"kind": "swap"}, False),
-        ({"kind": "restart_camera", "keep_clock": True}, False),
+        ({"kind": "drop_frame"}, "link_lost_it"),
+        ({"kind": "drop_trigger"}, "camera_missed_trigger"),
+        ({"kind": "wrong_size"}, "wrong_size"),
+        ({"kind": "late", "by": 40}, "link_lost_it"),
+        ({"kind": "duplicate"}, None),
+        ({"kind": "late", "by": 10}, None),
+        ({"kind": "swap"}, None),
+        ({"kind": "restart_camera", "keep_clock": True}, None),
     ],
     ids=lambda value: "-".join(map(str, value.values())) if isinstance(value, dict) else "",
 )
@@ -89,7 +90,9 @@ def test_a_fault_costs_its_own_slot_at_most_in_every_kind_of_slot(tmp_path, clea
     faults = [{**fault, "trigger": trigger} for trigger in STRUCK.values()]
     archive, report = record(tmp_path / "take", faults, code=2 if lost else 0)
     assert missing_triggers(archive) == (set(STRUCK.values()) if lost else set())
-    assert report["duplicates"] == (len(STRUCK) if fault["kind"] == "duplicate" else 0)
+    assert report["causes"] == ({lost: len(STRUCK)} if lost else {}) == identification(archive)["causes"]
+    assert {slot["cause"] for slot in missing_slots(archive)} == ({lost} if lost else set())
+    assert report["cameras"][0]["duplicates"] == (len(STRUCK) if fault["kind"] == "duplicate" else 0)
     expect_same(archive, clean, 0)
     expect_same(archive, clean, 2)
     lamp = slots_of("single")[STRUCK["basis"] - CYCLE]["row"]
@@ -100,7 +103,7 @@ def test_a_fault_costs_its_own_slot_at_most_in_every_kind_of_slot(tmp_path, clea
 def test_a_camera_whose_clock_starts_anew_is_found_again_by_the_optical_code(tmp_path, clean, kind):
     fault = {"kind": "restart_camera", "keep_clock": False, "trigger": STRUCK[kind]}
     archive, report = record(tmp_path / "take", [fault])
-    assert missing_triggers(archive) == set() and report["camera_restarts"] == 1
+    assert missing_triggers(archive) == set() and report["cameras"][0]["restarts"] == 1
     for index in range(CYCLES):
         expect_same(archive, clean, index)
 
@@ -111,7 +114,8 @@ def test_a_board_that_resets_ends_the_take_with_what_was_proved(tmp_path, clean,
     missing = missing_triggers(archive)
     # The log is read in messages: what the board had not told when it was reset is missing too, and nothing before.
     assert missing == set(range(min(missing), CYCLES * CYCLE)) and min(missing) <= STRUCK[kind]
-    assert report["board_end"] and report["targets_written"] >= 1
+    assert report["board_end"]["cause"] == "board_gone" and report["targets_written"] >= 1
+    assert report["causes"]["board_gone"] > 0 and set(report["causes"]) <= {"board_gone", "log_lost_it", "not_proved"}
     expect_same(archive, clean, 0)
 
 
@@ -120,9 +124,9 @@ def test_old_buffers_are_known_by_their_bits_in_every_kind_of_slot_and_cost_that
     struck = [*STRUCK.values(), STRUCK["basis"] + 20]
     archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": trigger} for trigger in struck], code=2)
     assert missing_triggers(archive) == set(struck)
-    assert all("stale: the camera's frame" in slot["why"] and "1 frames before" in slot["why"] for slot in identification(archive)["missing"])
-    assert report["stale_buffers"] == identification(archive)["stale_buffers"] == len(struck)
-    assert report["frames_without_noise"] == 0
+    assert all("stale: the camera's frame" in slot["why"] and "1 frames before" in slot["why"] for slot in missing_slots(archive))
+    assert report["causes"] == {"stale": len(struck)} and report["cameras"][0]["stale_buffers"] == len(struck)
+    assert report["cameras"][0]["frames_without_noise"] == 0
     expect_same(archive, clean, 0)
     expect_same(archive, clean, 1, [row for row in (slots_of("single")[trigger - CYCLE]["row"] for trigger in struck) if row >= 0])
     expect_same(archive, clean, 2)
@@ -133,12 +137,14 @@ def test_a_frozen_picture_without_noise_in_a_lit_landmark_takes_down_its_stretch
     stage = SMALL_STAGE + "noise_read_counts = 0\nnoise_shot = 0\n"
     whole, _ = record(tmp_path / "whole", [], stage=stage)
     archive, report = record(tmp_path / "take", [{"kind": "freeze", "trigger": STRUCK["tracking"]}], stage=stage, code=2)
-    assert report["stale_buffers"] == 0 and report["frames_without_noise"] == report["frames"] == CYCLES * CYCLE
+    camera = report["cameras"][0]
+    assert camera["stale_buffers"] == 0 and camera["frames_without_noise"] == camera["frames"] == CYCLES * CYCLE
     missing = missing_triggers(archive)
     # Back to the tracking slot before it. The matte slot in between proves nothing in a scene without a matte board: it
     # is as dark as a lamp behind the spheres.
     assert missing == set(range(STRUCK["tracking"] - 17, STRUCK["tracking"] + 1))
-    assert identification(archive)["missing"][0]["why"].startswith("the optical code disagrees")
+    assert missing_slots(archive)[0]["why"].startswith("the optical code disagrees")
+    assert report["causes"] == {"not_proved": 18}
     expect_same(archive, whole, 0)
     rows = [slots_of("single")[trigger - CYCLE]["row"] for trigger in missing]
     expect_same(archive, whole, 1, [row for row in rows if row >= 0])

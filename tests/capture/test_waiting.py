@@ -44,7 +44,7 @@ def record_whole_take(stage, name):
         stage.stagectl("status", "--clear-fault", camera=False)
     report = stage.stagectl("run", "--sequence", sequence("single"), "--nominal", "--cycles", 2, "-o", stage.folder / name, "--json")
     assert report["slots_missing"] == 0 and report["targets_written"] == 2
-    assert report["camera"]["missing_ids"] == 0 and report["camera"]["dropped"] == 0
+    assert report["cameras"][0]["missing_ids"] == 0 and report["cameras"][0]["dropped"] == 0
     return report
 
 
@@ -95,8 +95,9 @@ def test_a_camera_that_died_is_named_as_the_cause_in_report_journal_and_manifest
     _, errors = run.communicate(timeout=300)
     assert run.returncode == 2 and "the camera is gone" in errors, errors
     told = identification(archive)
-    assert "the camera is gone" in told["camera_end"]
-    assert any("the camera is gone" in missing["why"] for missing in told["missing"]) or told["board_end"]
+    end = told["cameras"][0]["end"]
+    assert "the camera is gone" in end["why"] and end["cause"] == "camera_gone"
+    assert told["causes"].get("camera_gone") or told["board_end"]
     journal = (archive / "journal.jsonl").read_text()
     last = json.loads(journal.splitlines()[-2])
     # The board of this stage dies a moment after it; what was not recorded is put down to the one that was missed first.

@@ -74,8 +74,13 @@ def manifest(archive):
     return json.loads((archive / "manifest.json").read_text())
 
 
-def missing_triggers(archive):
-    ranges = identification(archive)["missing"]
+def missing_slots(archive, camera=0):
+    """Ranges of triggers without a frame, each with cause and witnesses."""
+    return identification(archive)["cameras"][camera]["missing"]
+
+
+def missing_triggers(archive, camera=0):
+    ranges = missing_slots(archive, camera)
     return {first for r in ranges for first in range(r["first_trigger"], r["first_trigger"] + r["count"])}
 
 
@@ -83,13 +88,13 @@ def identification(archive):
     return manifest(archive)["extra"]["identification"]
 
 
-def target_file(archive, index):
-    return archive / "cam0" / f"target_{index:06}.exr"
+def target_file(archive, index, camera=0):
+    return archive / f"cam{camera}" / f"target_{index:06}.exr"
 
 
-def read_lamps(archive, index, channel="Y"):
+def read_lamps(archive, index, channel="Y", camera=0):
     """[lamp, y, x] of a target."""
-    for part in OpenEXR.File(str(target_file(archive, index)), separate_channels=True).parts:
+    for part in OpenEXR.File(str(target_file(archive, index, camera)), separate_channels=True).parts:
         if part.header["name"] == "lamps":
             names = sorted(name for name in part.channels if name.endswith("." + channel))
             return np.stack([part.channels[name].pixels for name in names]).astype(np.float64)

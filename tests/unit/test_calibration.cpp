@@ -55,7 +55,7 @@ Frame flat_frame(uint32_t width, uint32_t height, uint16_t counts) {
 }  // namespace
 
 TEST_F(CalibrationFolder, what_is_written_is_read_back) {
-    ASSERT_TRUE(write_calibration(folder_, calibration_, {0.985, 24.4, 128}).ok());
+    ASSERT_TRUE(write_calibration(folder_, 0, calibration_.cameras[0], {0.985, 24.4, 128}).ok());
     const auto read = read_calibration(folder_, stage_);
     ASSERT_TRUE(read.ok()) << read.error().message;
     EXPECT_EQ(read->cameras[0].black.data, calibration_.cameras[0].black.data);
@@ -65,18 +65,32 @@ TEST_F(CalibrationFolder, what_is_written_is_read_back) {
 
 TEST_F(CalibrationFolder, another_size_a_value_that_is_none_and_a_missing_file_are_refused_by_name) {
     EXPECT_NE(error().find("calibration.toml"), std::string::npos);
-    ASSERT_TRUE(write_calibration(folder_, calibration_, {0.985, 24.4, 128}).ok());
+    ASSERT_TRUE(write_calibration(folder_, 0, calibration_.cameras[0], {0.985, 24.4, 128}).ok());
     stage_.cameras[0].width = 21;
     EXPECT_NE(error().find("black.exr"), std::string::npos);
     stage_.cameras[0].width = 20;
     calibration_.cameras[0].flat.at(0, 0) = 0;
-    ASSERT_TRUE(write_calibration(folder_, calibration_, {0.985, 24.4, 128}).ok());
+    ASSERT_TRUE(write_calibration(folder_, 0, calibration_.cameras[0], {0.985, 24.4, 128}).ok());
     EXPECT_NE(error().find("flat.exr"), std::string::npos);
     calibration_.cameras[0].flat.at(0, 0) = std::numeric_limits<float>::quiet_NaN();
-    ASSERT_TRUE(write_calibration(folder_, calibration_, {0.985, 24.4, 128}).ok());
+    ASSERT_TRUE(write_calibration(folder_, 0, calibration_.cameras[0], {0.985, 24.4, 128}).ok());
     EXPECT_NE(error().find("stagectl calibrate"), std::string::npos);
     std::filesystem::remove(folder_ / "cam0/black.exr");
     EXPECT_NE(error().find("black.exr"), std::string::npos);
+}
+
+TEST_F(CalibrationFolder, each_camera_has_its_part_and_one_that_lacks_is_named) {
+    stage_.cameras.push_back(stage_.cameras[0]);
+    stage_.cameras[1].width = 30;
+    calibration_ = nominal_calibration(stage_);
+    calibration_.cameras[1].black.at(29, 9) = 70;
+    ASSERT_TRUE(write_calibration(folder_, 1, calibration_.cameras[1], {0.985, 24.4, 128}).ok());
+    EXPECT_NE(error().find("camera 0 is not calibrated"), std::string::npos) << error();
+    ASSERT_TRUE(write_calibration(folder_, 0, calibration_.cameras[0], {0.985, 24.4, 128}).ok());
+    const auto read = read_calibration(folder_, stage_);
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_EQ(read->cameras[0].black.data, calibration_.cameras[0].black.data);
+    EXPECT_EQ(read->cameras[1].black.data, calibration_.cameras[1].black.data);
 }
 
 TEST(FrameSummary, blocks_are_the_means_of_their_pixels_for_any_size) {

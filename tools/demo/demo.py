@@ -155,7 +155,7 @@ class Demo:
         weights = run_json(BIN / "rf", "weights", "--env", environment(TRUTH_ENVIRONMENT), "--json")
         irradiance = np.array([lamp["irradiance"] for lamp in weights["lamps"]])
         flat = noise.read_image(self.out / "calibration_noisy/cam0/flat.exr")
-        facts = tomllib.loads((self.out / "calibration_noisy/calibration.toml").read_text())
+        facts = tomllib.loads((self.out / "calibration_noisy/cam0/calibration.toml").read_text())
         facing = sum(max(0.0, lamp["direction"][2]) for lamp in weights["lamps"])  # the card faces +z
         card = facts["frames"], facts["card_exposure_us"] * CARD_REFLECTANCE * facing
         figures = {}

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+// Frames in, and what is known of each.
+#include "record/camera_reader.hpp"
+
+#include "exceptions.hpp"
+
+namespace ols {
+
+namespace {
+
+// Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
+bool is_whole(const Frame& frame, const CameraConfig& config) {
+    const size_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+    return frame.width == uint32_t(config.width) && frame.height == uint32_t(config.height) &&
+           frame.cfa == config.cfa &&
+           frame.pitch_bytes >= frame.width * size_t(samples_per_pixel(frame.cfa)) * sample_bytes &&
+           frame.pitch_bytes % sample_bytes == 0 && frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
+}
+
+}  // namespace
+
+CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue)
+    : camera_(camera),
+      config_(config),
+      options_(std::move(options)),
+      bits_(config),
+      room_(std::make_shared<Room>(ptrdiff_t(options_.frames_max))),
+      queue_(queue),
+      dropped_before_(camera.counts().dropped) {
+    thread_ = std::thread([this] {
+        const Status done = guarded("the camera cannot be read", [this] { return read(), Status(Done{}); });
+        if (!done) queue_.push(CameraPause{0, {CameraState::gone, done.error().message}, disk_drops_, host_drops_});
+    });
+}
+
+CameraReader::~CameraReader() {
+    end_ = true;
+    thread_.join();
+}
+
+void CameraReader::read() {
+    while (!end_) {
+        count_drops();
+        if (!room_->try_acquire_for(std::chrono::milliseconds(pause_ms))) continue;
+        CameraState state = camera_.state();
+        const bool is_live = state.kind == CameraState::live;
+        const uint64_t watermark_ns = camera_.watermark_ns();
+        auto frame = camera_.read(pause_ms);
+        count_drops();
+        if (frame) {
+            enqueue(std::move(*frame));
+            continue;
+        }
+        room_->release();
+        queue_.push(CameraPause{watermark_ns, std::move(state), disk_drops_, host_drops_});
+        if (!is_live) return;
+    }
+}
+
+// The camera says how many it had no room for; what filled the room is known here, at the time.
+void CameraReader::count_drops() {
+    const uint64_t more = camera_.counts().dropped - dropped_before_ - drops();
+    if (more > 0) (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
+}
+
+void CameraReader::enqueue(Frame frame) {
+    FrameNews news;
+    news.witness.arrival = arrivals_++;
+    news.witness.stamp = frame.stamp;
+    news.witness.disk_drops = disk_drops_, news.witness.host_drops = host_drops_;
+    if (!is_whole(frame, config_)) {
+        news.witness.unfit = {Cause::wrong_size, "its size or format is not the stage's"};
+    } else {
+        news.witness.summary = summarize_frame(frame, options_.black_counts.value_or(frame.black), config_.noise);
+        news.bits = bits_.read(frame);
+    }
+    news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = room_](Frame* last) {
+        delete last;
+        room->release();
+    });
+    queue_.push(std::move(news));
+}
+
+}  // namespace ols

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// What a reader holds, and whom it blames for what it could not: a camera under the test's control, and a sink that lets nothing go.
+// links: ols_record
+#include "record/camera_reader.hpp"
+
+#include <gtest/gtest.h>
+
+#include "device/fake_camera.hpp"
+
+using namespace ols;
+
+namespace {
+
+constexpr size_t room = 4, frames_max = 3;
+
+class Reading : public testing::Test {
+  protected:
+    void begin() {
+        config_.width = 16, config_.height = 8;
+        ASSERT_TRUE(camera_.set_up(config_).ok());
+        ASSERT_TRUE(camera_.start().ok());
+        reader_.emplace(camera_, config_,
+                        CameraReaderOptions{std::nullopt, frames_max, [this] { return disk_is_late_.load(); }}, queue_);
+    }
+    // The next frame; pauses before it are left out.
+    FrameNews next_frame() {
+        for (;;) {
+            RecordEvent event = *queue_.pop();
+            if (auto* news = std::get_if<FrameNews>(&event)) return std::move(*news);
+        }
+    }
+    void expose(int count) {
+        for (int n = 0; n < count; ++n) camera_.trigger();
+    }
+    // Until the reader, which looks while it has no room, knows of so many.
+    void wait_for_drops(uint64_t count) const {
+        while (reader_->drops() < count) std::this_thread::yield();
+    }
+
+    CameraConfig config_;
+    FakeCamera camera_{{.room = room}};
+    std::atomic<bool> disk_is_late_ = false;
+    RecordQueue queue_{SIZE_MAX};
+    std::optional<CameraReader> reader_;
+};
+
+}  // namespace
+
+TEST_F(Reading, no_more_frames_are_held_than_may_be_and_what_is_dropped_meanwhile_is_ours) {
+    begin();
+    expose(frames_max);
+    std::vector<FrameNews> held;
+    for (size_t n = 0; n < frames_max; ++n) held.push_back(next_frame());
+    EXPECT_EQ(held.back().witness.host_drops, 0u);
+    expose(room + 5);  // nothing is read any more: the camera keeps four and drops five
+    wait_for_drops(5);
+    EXPECT_EQ(reader_->arrivals(), frames_max);
+    disk_is_late_ = true;
+    expose(2);
+    wait_for_drops(7);
+    held.clear();
+    for (size_t n = 0; n < room; ++n) {
+        const FrameNews news = next_frame();
+        EXPECT_EQ(news.witness.stamp.frame_id, frames_max + n + 1);
+        EXPECT_EQ(news.witness.host_drops, 5u);
+        EXPECT_EQ(news.witness.disk_drops, 2u);
+    }
+    expose(1);
+    const FrameNews after = next_frame();
+    EXPECT_EQ(after.witness.stamp.frame_id, frames_max + room + 8);
+    EXPECT_EQ(camera_.counts().missing_ids, 7u);
+}
+
+TEST_F(Reading, what_is_still_dropped_at_the_end_is_told_with_the_pause) {
+    begin();
+    expose(frames_max);
+    std::vector<FrameNews> held;
+    for (size_t n = 0; n < frames_max; ++n) held.push_back(next_frame());
+    expose(room + 3);
+    wait_for_drops(3);
+    held.clear();
+    for (size_t n = 0; n < room; ++n) next_frame();
+    for (;;) {
+        const RecordEvent event = *queue_.pop();
+        if (const auto* pause = std::get_if<CameraPause>(&event)) {
+            EXPECT_EQ(pause->host_drops, 3u);
+            EXPECT_EQ(pause->disk_drops, 0u);
+            break;
+        }
+    }
+}
