@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "device/aravis_camera.hpp"
 #include "device/fake_camera.hpp"
 #include "device/ring_camera.hpp"
 
@@ -57,10 +58,13 @@ Status check_setup(const std::string& camera, const CameraSetup& wanted, const C
 }
 
 Result<std::unique_ptr<Camera>> open_camera(const std::string& source, uint32_t index) {
-    constexpr std::string_view ring_scheme = "ring:", fake_scheme = "fake:";
+    constexpr std::string_view ring_scheme = "ring:", fake_scheme = "fake:", aravis_scheme = "aravis:";
     if (source.starts_with(ring_scheme)) return open_ring_camera(source.substr(ring_scheme.size()), index);
     if (source.starts_with(fake_scheme)) return open_fake_camera(source.substr(fake_scheme.size()), index);
-    return fail("'" + source + "' is no camera: write ring:PATH, or fake:RATE for one without hardware");
+    if (source.starts_with(aravis_scheme)) return open_aravis_camera(source.substr(aravis_scheme.size()), index);
+    return fail("'" + source +
+                "' is no camera: write aravis:SERIAL, or aravis: for the only GigE or USB3 camera; ring:PATH; or fake:RATE for "
+                "one without hardware");
 }
 
 }  // namespace ols
