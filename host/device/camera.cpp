@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "device/aravis_camera.hpp"
 #include "device/fake_camera.hpp"
 #include "device/ring_camera.hpp"
 #include "device/v4l2_camera.hpp"
@@ -65,12 +66,16 @@ Status check_setup(const std::string& camera, const CameraSetup& wanted, const C
 }
 
 Result<std::unique_ptr<Camera>> open_camera(const std::string& source, uint32_t index) {
-    constexpr std::string_view ring_scheme = "ring:", fake_scheme = "fake:", v4l2_scheme = "v4l2:";
-    if (source.starts_with(ring_scheme)) return open_ring_camera(source.substr(ring_scheme.size()), index);
-    if (source.starts_with(fake_scheme)) return open_fake_camera(source.substr(fake_scheme.size()), index);
-    if (source.starts_with(v4l2_scheme)) return open_v4l2_camera(source.substr(v4l2_scheme.size()), index);
+    using Open = Result<std::unique_ptr<Camera>> (*)(const std::string& rest, uint32_t index);
+    constexpr std::pair<std::string_view, Open> schemes[] = {{"aravis:", open_aravis_camera},
+                                                             {"v4l2:", open_v4l2_camera},
+                                                             {"ring:", open_ring_camera},
+                                                             {"fake:", open_fake_camera}};
+    for (const auto& [scheme, open] : schemes)
+        if (source.starts_with(scheme)) return open(source.substr(scheme.size()), index);
     return fail("'" + source +
-                "' is no camera: write v4l2:/dev/video0, ring:PATH, or fake:RATE for one without hardware");
+                "' is no camera: write aravis:SERIAL, or aravis: for the only GigE or USB3 camera; v4l2:/dev/video0; "
+                "ring:PATH; or fake:RATE for one without hardware");
 }
 
 }  // namespace ols

@@ -81,6 +81,7 @@ class Camera {
     virtual CameraState state() const = 0;
 };
 
+// "aravis:SERIAL" is a GigE Vision or USB3 Vision camera, "aravis:" the only one there is (device/aravis_camera.hpp);
 // "ring:PATH" is a shared-memory ring that another program fills (device/ring.hpp), as the virtual stage does;
 // "v4l2:/dev/video0" one of the kernel's (device/v4l2_camera.hpp); "fake:RATE" one without hardware (device/fake_camera.hpp). Frames are marked as camera `index`'s.
 Result<std::unique_ptr<Camera>> open_camera(const std::string& source, uint32_t index = 0);

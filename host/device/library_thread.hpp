@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// LibraryThread: a thread for the calls of a library that may wait for ever on its device. Whoever makes a call waits for a
+// bounded time; a call that hangs is left behind with all that it holds, and what is asked for after it is not answered either.
+#pragma once
+
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+
+namespace ols {
+
+// All functions from any thread. A call owns what it touches (by shared pointers): it may outlive whoever made it.
+class LibraryThread {
+  public:
+    LibraryThread();
+    // Waits until everything that was posted is done, for at most so long.
+    ~LibraryThread();
+    static constexpr int end_patience_ms = 10'000;
+
+    // Makes the call after those before it, and waits for nothing.
+    void post(std::function<void()> call);
+
+    // Calls `tick` whenever nothing else was asked for in so long.
+    void set_tick(std::function<void()> tick, int period_ms);
+
+    // What `call` returns; nothing when it has not within `patience_ms`, or when `give_up` turned true meanwhile.
+    template <typename Call>
+    std::optional<std::invoke_result_t<Call>> run(Call call, int patience_ms, const std::function<bool()>& give_up) {
+        using Returned = std::invoke_result_t<Call>;
+        const auto task = std::make_shared<std::packaged_task<Returned()>>(std::move(call));
+        auto returned = task->get_future();
+        post([task] { (*task)(); });
+        constexpr int look_ms = 10;
+        for (int waited_ms = 0;; waited_ms += look_ms) {
+            if (returned.wait_for(std::chrono::milliseconds(look_ms)) == std::future_status::ready) return returned.get();
+            if (waited_ms >= patience_ms || give_up()) return std::nullopt;
+        }
+    }
+
+  private:
+    struct Shared;
+    static void work(Shared& shared);
+    std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace ols
