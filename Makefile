@@ -4,6 +4,7 @@
 PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
+SIDE_BY_SIDE := $(MAKE) --no-print-directory -j2 --output-sync=target
 
 .PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil guest-test fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
@@ -38,8 +39,14 @@ test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil ## 
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
 	@ctest --test-dir $(CHECKED) --output-on-failure -j2 --no-tests=error
-	@$(PYTHON) -m pytest -q tests/unit tests/oracle
+	@$(SIDE_BY_SIDE) unit-pytest oracle-pytest unit-npm
+
+unit-npm:
 	@cd tools/stagesim/board && npm test --silent
+
+# Suites of single-threaded tests, two at a time.
+%-pytest:
+	@$(PYTHON) -m pytest -q tests/$*
 
 stability: checked ## the hard cases: naive method, ours, derived bound (docs/stability.md)
 	@$(PYTHON) tests/stability/table.py --check
@@ -60,7 +67,7 @@ noise: all ## Wenger's SNR comparison on the virtual stage, and what designed ba
 	@$(PYTHON) tests/bench/basis_gain.py --out out/bench --plot docs/images/basis_gain.png --page docs/bases.md
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
-	@$(PYTHON) -m pytest -q tests/hil tests/capture
+	@$(SIDE_BY_SIDE) hil-pytest capture-pytest
 
 guest-test: all ## stagectl on the real kernel's CAN, USB, V4L2 and GPIO, in a QEMU guest (the first time some 220 MB to download)
 	@$(PYTHON) -m pytest -q tests/guest
