@@ -107,7 +107,8 @@ Result<int64_t> V4l2Controls::set(uint32_t id, int64_t value) {
 
 std::vector<std::pair<int64_t, std::string>> V4l2Controls::items_of(const Control& control) const {
     std::vector<std::pair<int64_t, std::string>> items;
-    for (int64_t n = control.minimum; n <= std::min(int64_t(control.maximum), int64_t(control.minimum) + items_max); ++n) {
+    for (int64_t n = control.minimum; n <= std::min(int64_t(control.maximum), int64_t(control.minimum) + items_max);
+         ++n) {
         v4l2_querymenu item{};
         item.id = control.id;
         item.index = uint32_t(n);

@@ -61,6 +61,7 @@ constexpr Format formats[] = {
 };
 
 constexpr uint32_t offers_max = 1024;  // a driver that never ends its list is cut short here
+constexpr size_t others_named_max = 4;
 
 bool offers(const std::vector<OfferedFormat>& offered, uint32_t fourcc) {
     return std::any_of(offered.begin(), offered.end(), [&](const auto& format) { return format.fourcc == fourcc; });
@@ -94,13 +95,28 @@ std::optional<uint32_t> choose_format(const std::vector<OfferedFormat>& offered,
     return std::nullopt;
 }
 
-std::string describe_formats(const std::vector<OfferedFormat>& offered) {
-    std::string text;
-    for (const auto& [fourcc, description] : offered) {
-        text += (text.empty() ? "" : ", ") + fourcc_text(fourcc) + " (" + description;
-        text += layout_of_fourcc(fourcc) ? ")" : "; not read here)";
+uint32_t nearest_format(const std::vector<OfferedFormat>& offered, Cfa cfa) {
+    uint32_t nearest = 0;
+    for (const auto& format : offered) {
+        const auto layout = layout_of_fourcc(format.fourcc);
+        if (layout && layout->cfa == cfa) return format.fourcc;
+        if (layout && nearest == 0) nearest = format.fourcc;
     }
-    return text.empty() ? "no format at all" : text;
+    return nearest != 0 || offered.empty() ? nearest : offered.front().fourcc;
+}
+
+std::string describe_formats(const std::vector<OfferedFormat>& offered) {
+    std::string ours, others;
+    size_t count = 0;
+    for (const auto& [fourcc, description] : offered) {
+        if (layout_of_fourcc(fourcc))
+            ours += (ours.empty() ? "" : ", ") + fourcc_text(fourcc) + " (" + description + ")";
+        else if (++count <= others_named_max)
+            others += (others.empty() ? "" : ", ") + fourcc_text(fourcc);
+    }
+    if (count > others_named_max) others += " and " + std::to_string(count - others_named_max) + " more";
+    if (ours.empty()) ours = "none that is read here";
+    return others.empty() ? ours : ours + "; not read here: " + others;
 }
 
 }  // namespace ols

@@ -24,7 +24,10 @@ std::vector<OfferedFormat> offered_formats(V4l2Device& device);
 // Of the formats with this mosaic and so many bits the one that takes the fewest bytes; nothing when none is offered.
 std::optional<uint32_t> choose_format(const std::vector<OfferedFormat>& offered, Cfa cfa, int bits);
 
-// "GREY (8-bit Greyscale), RG12 (12-bit Bayer RGRG/GBGB), MJPG (Motion-JPEG; not read here)"
+// One to compare with where none is: of this mosaic, or else any that is read here, or else any.
+uint32_t nearest_format(const std::vector<OfferedFormat>& offered, Cfa cfa);
+
+// "GREY (8-bit Greyscale), RG12 (12-bit Bayer RGRG/GBGB); not read here: MJPG"
 std::string describe_formats(const std::vector<OfferedFormat>& offered);
 
 }  // namespace ols

@@ -110,7 +110,7 @@ Result<V4l2Setup> set_up_v4l2(V4l2Device& device, const std::string& name, const
                     " offers no pixel format: where another program feeds it (v4l2loopback), start that one first; "
                     "otherwise see `v4l2-ctl --list-formats-ext`");
     const auto chosen = choose_format(offered, wanted.cfa, wanted.bits);
-    const auto pix = set_format(device, name, wanted, chosen.value_or(offered.front().fourcc));
+    const auto pix = set_format(device, name, wanted, chosen.value_or(nearest_format(offered, wanted.cfa)));
     if (!pix.ok()) return pix.error();
     const auto layout = layout_of_fourcc(pix->pixelformat);
     V4l2Setup made;
@@ -129,8 +129,11 @@ Result<V4l2Setup> set_up_v4l2(V4l2Device& device, const std::string& name, const
     if (!controls.has(V4L2_CID_EXPOSURE_ABSOLUTE)) lacks.insert("exposure_mode");
     const Status fits = check_setup(name, wanted, made.setup, lacks);
     if (!layout || made.setup.cfa != wanted.cfa || made.setup.bits != wanted.bits)
-        problems = joined(problems, fmt::format("its pixel format is {}, cfa and bits ask for another; it offers {}",
-                                                fourcc_text(pix->pixelformat), describe_formats(offered)));
+        problems = joined(problems, fmt::format("its pixel format is {}{}; it offers {}", fourcc_text(pix->pixelformat),
+                                                chosen && *chosen != pix->pixelformat
+                                                    ? ", which its driver made of " + fourcc_text(*chosen)
+                                                    : "",
+                                                describe_formats(offered)));
     const bool asks_trigger = !wanted.trigger_source.empty() || wanted.trigger_delay_us != 0 ||
                               wanted.trigger_activation != TriggerActivation::rising_edge;
     if (asks_trigger) {

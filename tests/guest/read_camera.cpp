@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Reads a camera through its driver and says what came, a line of JSON each: for tests that look at a driver from outside.
 //
-// usage: read_camera STAGE.toml SOURCE FRAMES [SAVED [PAUSE_AFTER PAUSE_MS]]
-// Sets the camera up as the stage's first [[camera]] says, starts it, reads so many frames and ends. SAVED gets their samples.
+// usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE_AFTER]]
+// Sets the camera up as the stage's first [[camera]] says, starts it, and ends after so many frames, or with that of the id. SAVED
+// gets their samples. It waits for a line of standard input after so many frames; of 0, before the set-up.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -39,20 +39,24 @@ int refuse(const Error& error) {
 }
 
 int read_camera(int argc, char** argv) {
-    if (argc < 4) return refuse(fail("usage: read_camera STAGE.toml SOURCE FRAMES [SAVED [PAUSE_AFTER PAUSE_MS]]"));
+    if (argc < 4) return refuse(fail("usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE_AFTER]]"));
     const auto stage = read_stage(argv[1]);
     if (!stage.ok()) return refuse(stage.error());
     auto camera = open_camera(argv[2]);
     if (!camera.ok()) return refuse(camera.error());
     say({{"opened", (*camera)->info().name}});
+    const int pause_after = argc > 5 ? std::atoi(argv[5]) : -1;
+    std::string line;
+    if (pause_after == 0) std::getline(std::cin, line);
     const CameraSetup& setup = stage->cameras.at(0);
     if (const Status fits = (*camera)->set_up(setup); !fits.ok()) return refuse(fits.error());
     const auto started_ns = (*camera)->start();
     if (!started_ns.ok()) return refuse(started_ns.error());
     say({{"started_ns", *started_ns}, {"link", (*camera)->info().link}});
     std::ofstream saved(argc > 4 ? argv[4] : "/dev/null", std::ios::binary);
-    const int frames = std::atoi(argv[3]), pause_after = argc > 6 ? std::atoi(argv[5]) : -1;
-    for (int n = 0; n < frames && (*camera)->state().kind == CameraState::live;) {
+    const bool is_until_id = argv[3][0] == '@';
+    const uint64_t wanted = std::strtoull(argv[3] + is_until_id, nullptr, 10);
+    for (uint64_t n = 0, id = 0; (is_until_id ? id : n) < wanted && (*camera)->state().kind == CameraState::live;) {
         const auto frame = (*camera)->read(100);
         if (!frame) continue;
         saved.write(reinterpret_cast<const char*>(frame->samples.data()), std::streamsize(frame->samples.size()));
@@ -61,7 +65,8 @@ int read_camera(int argc, char** argv) {
              {"time_ns", frame->stamp.timestamp_ns},
              {"first", samples[0]},
              {"last", samples[frame->samples.size() / 2 - 1]}});
-        if (++n == pause_after) usleep(useconds_t(std::atoi(argv[6])) * 1000);
+        id = frame->stamp.frame_id;
+        if (++n == uint64_t(pause_after)) std::getline(std::cin, line);
     }
     saved.flush();
     say(end_of(**camera));

@@ -2,7 +2,7 @@
 """Feeds a v4l2loopback device by write(), as an mmap writer leaves `sequence` 0: frames from standard input, or numbered ones.
 
 usage: feed_loopback.py DEVICE FOURCC WIDTH HEIGHT BYTES [COUNT RATE_HZ]
-BYTES is a sample's. A numbered frame has its number, from 0, in its first and last sample. Says "ready" once the device has its
+BYTES is a sample's. A numbered frame has its number, from 0, in its first and last sample, as far as it goes in. Says "ready" once the device has its
 format, waits for a line of standard input if frames are to be numbered, and at the end says how many it has written.
 """
 import fcntl
@@ -34,7 +34,7 @@ def main():
         begin = time.monotonic()
         for number in range(count):
             time.sleep(max(0.0, begin + number / rate_hz - time.monotonic()))
-            mark = number.to_bytes(sample_bytes, "little")
+            mark = (number % 256**sample_bytes).to_bytes(sample_bytes, "little")
             written += os.write(fd, mark + bytes(size - 2 * sample_bytes) + mark) == size
     else:
         while len(frame := sys.stdin.buffer.read(size)) == size:
