@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <set>
 
 #include "device/camera.hpp"
@@ -30,11 +31,13 @@ class SettingUp {
     Result<AravisSetup> run(const std::string& name) {
         camera_.execute("AcquisitionStop");  // many features are locked while it runs
         set_mode();
+        for (const auto& [name, value] : wanted_.controls) camera_.set_words(name.c_str(), value);
         set_format();
         set_region();
         set_trigger();
         set_exposure();
         set_chunks();
+        read_controls();
         read_black();
         if (!camera_.broken().empty()) return fail(name + " is gone: it gives no answer (" + camera_.broken() + ")");
         const Status as_wanted = check_setup(name, wanted_, setup_.in_force, lacks_);
@@ -197,6 +200,19 @@ class SettingUp {
             (camera_.set_flag("ChunkEnable", true) || camera_.flag("ChunkEnable") == true))
             setup_.has_chunk_time = camera_.flag("ChunkEnable").value_or(false);
         if (!setup_.has_chunk_time) camera_.set_flag("ChunkModeActive", false);
+    }
+
+    // Last, as what a take needs goes before them. A number is the same however it is written.
+    void read_controls() {
+        for (const auto& [name, value] : wanted_.controls) {
+            const auto taken = camera_.words(name.c_str());
+            if (!taken) continue;
+            char *end = nullptr, *taken_end = nullptr;
+            const double number = std::strtod(value.c_str(), &end);
+            const double taken_number = std::strtod(taken->c_str(), &taken_end);
+            const bool are_numbers = !value.empty() && !*end && !taken->empty() && !*taken_end;
+            setup_.in_force.controls[name] = are_numbers && is_same(number, taken_number) ? value : *taken;
+        }
     }
 
     // Counts, or a share of white; of another unit nothing can be made.

@@ -101,7 +101,7 @@ GigeDevice::GigeDevice(GigeOptions options) : options_(std::move(options)), memo
     put_word(reg_trigger_mode + 4, 1);  // AcquisitionStart: a user left it on
     put_word(reg_exposure_auto, 1);
     put_word(reg_trigger_source, 1);
-    put_word(reg_black_level, 64);
+    put_word(reg_black_level, uint32_t(options_.black_level));
     update_payload();
 
     stream_ = bound_socket(options_.address, 0, false);

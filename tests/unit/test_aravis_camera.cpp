@@ -157,6 +157,17 @@ TEST(AravisSetup, names_keys_and_features_that_a_model_lacks) {
     EXPECT_EQ(o.set_up(), "") << "what it lacks is not needed";
 }
 
+TEST(AravisSetup, sets_features_of_the_cameras_own_by_their_names) {
+    Opened o;
+    o.wanted.controls = {{"BlackLevel", "128"}, {"TriggerOverlap", "ReadOut"}, {"TriggerDelay", "0.0"}};
+    ASSERT_EQ(o.set_up(), "");
+    EXPECT_EQ(o.device().word(reg_black_level), 128u);
+    o.wanted.controls = {{"BlackLevel", "9999"}, {"NoSuchThing", "1"}, {"ExposureAuto", "Sometimes"}};
+    const std::string message = o.set_up();
+    for (const char* words : {"BlackLevel", "128", "it has no control \"NoSuchThing\"", "ExposureAuto", "Off"})
+        EXPECT_NE(message.find(words), std::string::npos) << words << ": " << message;
+}
+
 TEST(AravisSetup, lists_what_could_be_had_of_inputs_and_formats) {
     GigeOptions options;
     options.description.pixel_formats = {"Mono8", "RGB8"};
