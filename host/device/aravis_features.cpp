@@ -85,7 +85,8 @@ std::vector<std::string> AravisFeatures::choices(const char* name) {
     if (!has(name)) return {};
     LibraryError error;
     guint count = 0;
-    const char** names = arv_device_dup_available_enumeration_feature_values_as_strings(device_, name, &count, error.out());
+    const char** names =
+        arv_device_dup_available_enumeration_feature_values_as_strings(device_, name, &count, error.out());
     const bool is_told = took(error) && names;
     std::vector<std::string> found;
     if (is_told) found.assign(names, names + count);

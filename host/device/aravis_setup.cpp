@@ -87,8 +87,8 @@ class SettingUp {
         setup_.in_force.bits = setup_.layout ? setup_.layout->bits : 0;
         setup_.in_force.cfa = setup_.layout ? setup_.layout->cfa : Cfa::none;
         if (best.empty())
-            problems_.push_back(fmt::format("none of its pixel formats is of {} bits and that colour filter: {}", wanted_.bits,
-                                            fmt::join(formats, ", ")));
+            problems_.push_back(fmt::format("none of its pixel formats is of {} bits and that colour filter: {}",
+                                            wanted_.bits, fmt::join(formats, ", ")));
         else if (setup_.pixel_format != best)
             problems_.push_back("its PixelFormat stays " + setup_.pixel_format);
     }
@@ -237,8 +237,11 @@ class SettingUp {
 }  // namespace
 
 std::optional<SampleLayout> sample_layout_of(const std::string& pixel_format) {
-    const std::pair<const char*, Cfa> filters[] = {
-        {"Mono", Cfa::none}, {"BayerRG", Cfa::rggb}, {"BayerBG", Cfa::bggr}, {"BayerGR", Cfa::grbg}, {"BayerGB", Cfa::gbrg}};
+    const std::pair<const char*, Cfa> filters[] = {{"Mono", Cfa::none},
+                                                   {"BayerRG", Cfa::rggb},
+                                                   {"BayerBG", Cfa::bggr},
+                                                   {"BayerGR", Cfa::grbg},
+                                                   {"BayerGB", Cfa::gbrg}};
     for (const auto& [name, cfa] : filters) {
         if (!pixel_format.starts_with(name)) continue;
         const std::string rest = pixel_format.substr(std::string(name).size());
@@ -246,7 +249,8 @@ std::optional<SampleLayout> sample_layout_of(const std::string& pixel_format) {
         const std::string packing = rest.substr(digits.size());
         for (const int bits : {8, 10, 12, 14, 16}) {
             if (digits != std::to_string(bits)) continue;
-            if (packing.empty()) return SampleLayout{bits == 8 ? SamplePacking::bytes : SamplePacking::words, bits, cfa};
+            if (packing.empty())
+                return SampleLayout{bits == 8 ? SamplePacking::bytes : SamplePacking::words, bits, cfa};
             if (packing == "p" && bits > 8 && bits < 16) return SampleLayout{SamplePacking::bits_low, bits, cfa};
             if (packing == "Packed" && (bits == 10 || bits == 12))
                 return SampleLayout{SamplePacking::gige_pairs, bits, cfa};

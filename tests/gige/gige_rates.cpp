@@ -60,8 +60,8 @@ int main() {
     struct Kind {
         int width, height, bits;
     };
-    fmt::print("{:>14} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7} {:>7}\n", "frames", "packets", "sent/s", "sent", "came", "missing",
-               "incompl", "dropped");
+    fmt::print("{:>14} {:>8} {:>9} {:>8} {:>8} {:>7} {:>7} {:>7}\n", "frames", "packets", "sent/s", "sent", "came",
+               "missing", "incompl", "dropped");
     for (const auto& [width, height, bits] : {Kind{128, 128, 12}, {640, 480, 8}, {640, 480, 12}})
         for (const int packet_bytes : {9000, 65000})
             for (const double rate_hz : {250.0, 500.0, 1000.0, 2160.0}) {
@@ -69,8 +69,8 @@ int main() {
                 setup.width = width, setup.height = height, setup.bits = bits, setup.cfa = ols::Cfa::none;
                 const Run run = run_at(rate_hz, setup, packet_bytes, 4);
                 fmt::print("{:>14} {:>8} {:>9.0f} {:>8} {:>8} {:>7} {:>7} {:>7}\n",
-                           fmt::format("{}x{}x{}", width, height, bits), packet_bytes, double(run.sent) / run.seconds, run.sent,
-                           run.came, run.counts.missing_ids, run.counts.underrun, run.counts.dropped);
+                           fmt::format("{}x{}x{}", width, height, bits), packet_bytes, double(run.sent) / run.seconds,
+                           run.sent, run.came, run.counts.missing_ids, run.counts.underrun, run.counts.dropped);
                 fflush(stdout);
             }
 }
