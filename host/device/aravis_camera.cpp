@@ -133,8 +133,7 @@ class AravisCamera : public Camera {
 
     CameraState state() const override {
         if (const auto acquisition = running(); acquisition && acquisition->stream->has_waiting()) return {};
-        if (link_->is_lost())
-            return gone("it was unplugged or switched off, or another program has taken it");
+        if (link_->is_lost()) return gone("it was unplugged or switched off, or another program has taken it");
         if (watch_->is_running && steady_ns() - watch_->life_ns > life_patience_ns)
             return gone(fmt::format("it gave no sign of life for {} s", device_patience_ms / 1000));
         if (watch_->is_running && watch_->has_ended)
@@ -159,8 +158,8 @@ class AravisCamera : public Camera {
     // What `call` returns, or what became of it; it is not waited for when there are more stops than `stops`.
     template <typename Value, typename Call>
     Result<Value> ask(uint64_t stops, Call call) {
-        auto answer = library_->run([call = std::move(call)]() mutable { return Result<Value>(call()); }, device_patience_ms,
-                                    [&] { return stops_ != stops; });
+        auto answer = library_->run([call = std::move(call)]() mutable { return Result<Value>(call()); },
+                                    device_patience_ms, [&] { return stops_ != stops; });
         if (answer) return std::move(*answer);
         if (stops_ != stops) return fail(stopped_text());
         return fail(gone("it gave no answer in " + std::to_string(device_patience_ms / 1000) + " s").why);
@@ -249,7 +248,8 @@ class AravisCamera : public Camera {
 
 Result<std::unique_ptr<Camera>> open_aravis_camera(const std::string& name, uint32_t index) {
     auto library = std::make_shared<LibraryThread>();
-    auto link = library->run([name] { return AravisLink::open(name); }, Camera::device_patience_ms, [] { return false; });
+    auto link =
+        library->run([name] { return AravisLink::open(name); }, Camera::device_patience_ms, [] { return false; });
     if (!link) return fail("the camera aravis:" + name + " gives no answer: check its power and cable");
     if (!link->ok()) return link->error();
     return std::unique_ptr<Camera>(std::make_unique<AravisCamera>(std::move(library), std::move(**link), index));

@@ -64,6 +64,15 @@ std::optional<bool> AravisFeatures::flag(const char* name) {
     return took(error) ? std::optional(value) : std::nullopt;
 }
 
+std::optional<std::string> AravisFeatures::words(const char* name) {
+    ArvGcNode* found = node(name);
+    if (!ARV_IS_GC_FEATURE_NODE(found)) return std::nullopt;
+    LibraryError error;
+    const char* value = arv_gc_feature_node_get_value_as_string(ARV_GC_FEATURE_NODE(found), error.out());
+    if (!took(error) || !value) return std::nullopt;
+    return value;
+}
+
 std::string AravisFeatures::unit(const char* name) {
     ArvGcNode* found = node(name);
     const char* unit = ARV_IS_GC_FLOAT(found)     ? arv_gc_float_get_unit(ARV_GC_FLOAT(found))
@@ -76,7 +85,8 @@ std::vector<std::string> AravisFeatures::choices(const char* name) {
     if (!has(name)) return {};
     LibraryError error;
     guint count = 0;
-    const char** names = arv_device_dup_available_enumeration_feature_values_as_strings(device_, name, &count, error.out());
+    const char** names =
+        arv_device_dup_available_enumeration_feature_values_as_strings(device_, name, &count, error.out());
     const bool is_told = took(error) && names;
     std::vector<std::string> found;
     if (is_told) found.assign(names, names + count);
@@ -120,6 +130,14 @@ bool AravisFeatures::set_flag(const char* name, bool value) {
     if (!has(name)) return false;
     LibraryError error;
     arv_device_set_boolean_feature_value(device_, name, value, error.out());
+    return took(error);
+}
+
+bool AravisFeatures::set_words(const char* name, const std::string& words) {
+    ArvGcNode* found = node(name);
+    if (!ARV_IS_GC_FEATURE_NODE(found)) return false;
+    LibraryError error;
+    arv_gc_feature_node_set_value_from_string(ARV_GC_FEATURE_NODE(found), words.c_str(), error.out());
     return took(error);
 }
 

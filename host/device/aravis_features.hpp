@@ -52,6 +52,7 @@ class AravisFeatures {
     std::optional<int64_t> integer(const char* name);
     std::optional<double> number(const char* name);  // of a float, or an integer
     std::optional<bool> flag(const char* name);
+    std::optional<std::string> words(const char* name);  // of a feature of any kind
     std::string unit(const char* name);
     std::vector<std::string> choices(const char* name);  // of an enumeration, those that can be had now
     struct Range {
@@ -64,6 +65,7 @@ class AravisFeatures {
     bool set_integer(const char* name, int64_t value);
     bool set_number(const char* name, double value);
     bool set_flag(const char* name, bool value);
+    bool set_words(const char* name, const std::string& words);
     bool execute(const char* name);
 
     // Why the device gives no answer; empty while it does.

@@ -40,7 +40,8 @@ uint64_t AravisFrames::time_ns(ArvBuffer* buffer) {
     const uint64_t leader_ns = arv_buffer_get_timestamp(buffer);
     if (!chunks_ || !arv_buffer_has_chunks(buffer)) return leader_ns;
     LibraryError error;
-    const auto ticks = uint64_t(arv_chunk_parser_get_integer_value(chunks_.get(), buffer, "ChunkTimestamp", error.out()));
+    const auto ticks =
+        uint64_t(arv_chunk_parser_get_integer_value(chunks_.get(), buffer, "ChunkTimestamp", error.out()));
     if (error) return leader_ns;
     const uint64_t scaled_ns = ticks_to_ns(ticks, chunk_ticks_hz_);
     for (const uint64_t ns : {ticks, scaled_ns})
@@ -67,7 +68,8 @@ bool AravisFrames::unpack(ArvBuffer* buffer, Frame& frame) const {
     const auto* data = static_cast<const std::byte*>(arv_buffer_get_image_data(buffer, &size));
     const size_t row_bytes = x_padding > 0 ? packed_row_bytes(layout, frame.width) + size_t(x_padding) : 0;
     frame.samples.resize(size_t(frame.pitch_bytes) * frame.height);
-    const std::span<uint16_t> samples(reinterpret_cast<uint16_t*>(frame.samples.data()), size_t(frame.width) * frame.height);
+    const std::span<uint16_t> samples(reinterpret_cast<uint16_t*>(frame.samples.data()),
+                                      size_t(frame.width) * frame.height);
     return unpack_samples({data, size}, layout, frame.width, frame.height, row_bytes, samples).ok();
 }
 

@@ -45,11 +45,13 @@ Result<std::string> choose_camera(const std::string& name) {
     const std::vector<Found> found = list_cameras();
     std::string list;
     for (const Found& camera : found)
-        list += fmt::format("{}aravis:{} ({} {})", list.empty() ? "" : ", ", camera.serial, camera.vendor, camera.model);
+        list +=
+            fmt::format("{}aravis:{} ({} {})", list.empty() ? "" : ", ", camera.serial, camera.vendor, camera.model);
     if (name.empty()) {
         if (found.empty())
             return fail(
-                "there is no GigE Vision or USB3 Vision camera: check its power and cable, for GigE that the computer has an "
+                "there is no GigE Vision or USB3 Vision camera: check its power and cable, for GigE that the computer "
+                "has an "
                 "address in its network and no firewall holds UDP back, for USB3 the udev rule (docs/cameras.md)");
         if (found.size() > 1) return fail("there are several cameras, say which: " + list);
         return found[0].id;
@@ -57,7 +59,8 @@ Result<std::string> choose_camera(const std::string& name) {
     std::vector<std::string> ids;
     for (const Found& camera : found)
         if (camera.serial == name || camera.id == name || camera.address == name) ids.push_back(camera.id);
-    if (ids.size() > 1) return fail("there are several cameras of serial number " + name + ": give the whole id, " + ids[0]);
+    if (ids.size() > 1)
+        return fail("there are several cameras of serial number " + name + ": give the whole id, " + ids[0]);
     return ids.empty() ? name : ids[0];
 }
 
@@ -136,7 +139,8 @@ Result<std::shared_ptr<AravisLink>> AravisLink::open(const std::string& name) {
                                 error ? error.message() : "there is none of that serial number, id or address"));
     if (ARV_IS_GV_DEVICE(device.get()) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())))
         return fail("the camera aravis:" + name +
-                    " is in use: another program controls it; end that one, or wait some seconds for the camera to let go of one "
+                    " is in use: another program controls it; end that one, or wait some seconds for the camera to let "
+                    "go of one "
                     "that crashed");
     return std::shared_ptr<AravisLink>(new AravisLink(std::move(device)));
 }
@@ -170,13 +174,15 @@ Result<std::unique_ptr<AravisStream>> AravisLink::make_stream(std::string& chose
     auto stream = std::make_unique<AravisStream>(ObjectPointer<ArvStream>(made));
     chosen = fmt::format("{} buffers of {} bytes", buffers, *payload);
     if (is_gige()) {
-        g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes, nullptr);
+        g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes,
+                     nullptr);
         ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
         g_object_get(made, "packet-resend", &resend, nullptr);
-        chosen = fmt::format("packets of {} bytes, {}, {}, socket buffer of {} KiB",
-                             arv_gv_device_get_packet_size(ARV_GV_DEVICE(device_.get()), error.out()),
-                             resend == ARV_GV_STREAM_PACKET_RESEND_ALWAYS ? "lost ones asked for again" : "lost ones lost",
-                             chosen, granted_socket_bytes() / 1024);
+        chosen =
+            fmt::format("packets of {} bytes, {}, {}, socket buffer of {} KiB",
+                        arv_gv_device_get_packet_size(ARV_GV_DEVICE(device_.get()), error.out()),
+                        resend == ARV_GV_STREAM_PACKET_RESEND_ALWAYS ? "lost ones asked for again" : "lost ones lost",
+                        chosen, granted_socket_bytes() / 1024);
     }
     for (size_t n = 0; n < buffers; ++n) stream->give_back(arv_buffer_new_allocate(size_t(*payload)));
     return stream;

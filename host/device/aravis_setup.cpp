@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <set>
 
 #include "device/camera.hpp"
@@ -30,11 +31,13 @@ class SettingUp {
     Result<AravisSetup> run(const std::string& name) {
         camera_.execute("AcquisitionStop");  // many features are locked while it runs
         set_mode();
+        for (const auto& [name, value] : wanted_.controls) camera_.set_words(name.c_str(), value);
         set_format();
         set_region();
         set_trigger();
         set_exposure();
         set_chunks();
+        read_controls();
         read_black();
         if (!camera_.broken().empty()) return fail(name + " is gone: it gives no answer (" + camera_.broken() + ")");
         const Status as_wanted = check_setup(name, wanted_, setup_.in_force, lacks_);
@@ -84,8 +87,8 @@ class SettingUp {
         setup_.in_force.bits = setup_.layout ? setup_.layout->bits : 0;
         setup_.in_force.cfa = setup_.layout ? setup_.layout->cfa : Cfa::none;
         if (best.empty())
-            problems_.push_back(fmt::format("none of its pixel formats is of {} bits and that colour filter: {}", wanted_.bits,
-                                            fmt::join(formats, ", ")));
+            problems_.push_back(fmt::format("none of its pixel formats is of {} bits and that colour filter: {}",
+                                            wanted_.bits, fmt::join(formats, ", ")));
         else if (setup_.pixel_format != best)
             problems_.push_back("its PixelFormat stays " + setup_.pixel_format);
     }
@@ -199,6 +202,19 @@ class SettingUp {
         if (!setup_.has_chunk_time) camera_.set_flag("ChunkModeActive", false);
     }
 
+    // Last, as what a take needs goes before them. A number is the same however it is written.
+    void read_controls() {
+        for (const auto& [name, value] : wanted_.controls) {
+            const auto taken = camera_.words(name.c_str());
+            if (!taken) continue;
+            char *end = nullptr, *taken_end = nullptr;
+            const double number = std::strtod(value.c_str(), &end);
+            const double taken_number = std::strtod(taken->c_str(), &taken_end);
+            const bool are_numbers = !value.empty() && !*end && !taken->empty() && !*taken_end;
+            setup_.in_force.controls[name] = are_numbers && is_same(number, taken_number) ? value : *taken;
+        }
+    }
+
     // Counts, or a share of white; of another unit nothing can be made.
     void read_black() {
         const char* name = camera_.first_of({"BlackLevel", "BlackLevelRaw"});
@@ -221,8 +237,11 @@ class SettingUp {
 }  // namespace
 
 std::optional<SampleLayout> sample_layout_of(const std::string& pixel_format) {
-    const std::pair<const char*, Cfa> filters[] = {
-        {"Mono", Cfa::none}, {"BayerRG", Cfa::rggb}, {"BayerBG", Cfa::bggr}, {"BayerGR", Cfa::grbg}, {"BayerGB", Cfa::gbrg}};
+    const std::pair<const char*, Cfa> filters[] = {{"Mono", Cfa::none},
+                                                   {"BayerRG", Cfa::rggb},
+                                                   {"BayerBG", Cfa::bggr},
+                                                   {"BayerGR", Cfa::grbg},
+                                                   {"BayerGB", Cfa::gbrg}};
     for (const auto& [name, cfa] : filters) {
         if (!pixel_format.starts_with(name)) continue;
         const std::string rest = pixel_format.substr(std::string(name).size());
@@ -230,7 +249,8 @@ std::optional<SampleLayout> sample_layout_of(const std::string& pixel_format) {
         const std::string packing = rest.substr(digits.size());
         for (const int bits : {8, 10, 12, 14, 16}) {
             if (digits != std::to_string(bits)) continue;
-            if (packing.empty()) return SampleLayout{bits == 8 ? SamplePacking::bytes : SamplePacking::words, bits, cfa};
+            if (packing.empty())
+                return SampleLayout{bits == 8 ? SamplePacking::bytes : SamplePacking::words, bits, cfa};
             if (packing == "p" && bits > 8 && bits < 16) return SampleLayout{SamplePacking::bits_low, bits, cfa};
             if (packing == "Packed" && (bits == 10 || bits == 12))
                 return SampleLayout{SamplePacking::gige_pairs, bits, cfa};

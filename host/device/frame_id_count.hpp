@@ -22,10 +22,10 @@ class FrameIdCount {
     uint64_t wraps_between(uint64_t steps, uint64_t ns) const;
     void measure(uint64_t steps, uint64_t ns);
 
-    std::optional<CameraStamp> last_;  // as the camera counts
-    uint64_t unwrapped_ = 0;           // of the last one
-    bool is_wide_ = false;             // it counts in 64 bits
-    uint64_t count_ = 65535;           // of ids until they repeat
+    std::optional<CameraStamp> last_;        // as the camera counts
+    uint64_t unwrapped_ = 0;                 // of the last one
+    bool is_wide_ = false;                   // it counts in 64 bits
+    uint64_t count_ = 65535;                 // of ids until they repeat
     uint64_t even_steps_ = 0, even_ns_ = 0;  // of the stretch of frames that came evenly
 };
 

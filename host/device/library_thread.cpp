@@ -48,8 +48,8 @@ void LibraryThread::work(Shared& shared) {
     std::unique_lock lock(shared.mutex);
     for (;;) {
         if (shared.calls.empty() && shared.ending) break;
-        const bool is_asked = shared.changed.wait_for(
-            lock, shared.period, [&] { return !shared.calls.empty() || shared.ending; });
+        const bool is_asked =
+            shared.changed.wait_for(lock, shared.period, [&] { return !shared.calls.empty() || shared.ending; });
         std::function<void()> call;
         if (is_asked && !shared.calls.empty()) {
             call = std::move(shared.calls.front());

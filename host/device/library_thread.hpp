@@ -33,7 +33,8 @@ class LibraryThread {
         post([task] { (*task)(); });
         constexpr int look_ms = 10;
         for (int waited_ms = 0;; waited_ms += look_ms) {
-            if (returned.wait_for(std::chrono::milliseconds(look_ms)) == std::future_status::ready) return returned.get();
+            if (returned.wait_for(std::chrono::milliseconds(look_ms)) == std::future_status::ready)
+                return returned.get();
             if (waited_ms >= patience_ms || give_up()) return std::nullopt;
         }
     }

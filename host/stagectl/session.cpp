@@ -84,7 +84,8 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
         "the board, usb:, usb:SERIAL, socket:PATH, can:IFACE or can-socket:PATH; otherwise stage.toml's [board] link");
     if (with_camera)
         verb.add_option("--camera", cameras,
-                        "the camera, aravis:SERIAL, v4l2:/dev/video0, ring:PATH or fake:RATE; once for each [[camera]] of the stage, "
+                        "the camera, aravis:SERIAL, v4l2:/dev/video0, ring:PATH or fake:RATE; once for each [[camera]] "
+                        "of the stage, "
                         "in their order; "
                         "otherwise stage.toml's camera sources")
             ->allow_extra_args(false);

@@ -48,7 +48,8 @@ class VirtualStage:
 
     def command(self, verb, *arguments, camera=True):
         links = ["--stage", self.stage, "--board", f"socket:{self.folder}/board.sock"]
-        links += ["--camera", f"ring:{self.folder}/cam0.ring"] if camera else []
+        source = f"ring:{self.folder}/cam0.ring" if camera is True else camera
+        links += ["--camera", source] if source else []
         return list(map(str, [BIN / "stagectl", verb, *links, *arguments]))
 
     def stagectl(self, verb, *arguments, code=0, camera=True):

@@ -59,12 +59,13 @@ ArvFakeRig::ArvFakeRig() {
     const char* xml = arv_fake_camera_get_genicam_xml(stock, &size);
     std::string description(xml, size);
     g_object_unref(stock);
-    description.insert(description.rfind("</RegisterDescription>"),
-                       R"(<Enumeration Name="AcquisitionStatusSelector"><EnumEntry Name="AcquisitionActive"><Value>0</Value></EnumEntry>)"
-                       R"(<Value>0</Value></Enumeration><Boolean Name="AcquisitionStatus"><pValue>StatusReg</pValue></Boolean>)"
-                       R"(<IntReg Name="StatusReg"><Address>0x124</Address><Length>4</Length><AccessMode>RO</AccessMode>)"
-                       R"(<pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign>)"
-                       R"(<Endianess>BigEndian</Endianess></IntReg>)");
+    description.insert(
+        description.rfind("</RegisterDescription>"),
+        R"(<Enumeration Name="AcquisitionStatusSelector"><EnumEntry Name="AcquisitionActive"><Value>0</Value></EnumEntry>)"
+        R"(<Value>0</Value></Enumeration><Boolean Name="AcquisitionStatus"><pValue>StatusReg</pValue></Boolean>)"
+        R"(<IntReg Name="StatusReg"><Address>0x124</Address><Length>4</Length><AccessMode>RO</AccessMode>)"
+        R"(<pPort>Device</pPort><Cachable>NoCache</Cachable><Sign>Unsigned</Sign>)"
+        R"(<Endianess>BigEndian</Endianess></IntReg>)");
     description_ = std::filesystem::temp_directory_path() / fmt::format("fake{}_{}.xml", getpid(), listening);
     std::ofstream(description_) << description;
     fake_ = arv_gv_fake_camera_new_full(address_.c_str(), address_.c_str(), description_.c_str());

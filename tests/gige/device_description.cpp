@@ -38,8 +38,8 @@ class Description {
     }
     void command(const std::string& name, uint32_t address) {
         if (!declare(name)) return;
-        nodes_ += fmt::format(
-            R"(<Command Name="{0}"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>)", name);
+        nodes_ +=
+            fmt::format(R"(<Command Name="{0}"><pValue>{0}Reg</pValue><CommandValue>1</CommandValue></Command>)", name);
         register_of(name, address, 4, "WO");
     }
     void flag(const std::string& name, uint32_t address) {
@@ -87,7 +87,8 @@ class Description {
         return true;
     }
     // `index` names the feature whose value counts registers of four bytes on from the address.
-    void register_of(const std::string& name, uint32_t address, int length, const char* access, const char* index = "") {
+    void register_of(const std::string& name, uint32_t address, int length, const char* access,
+                     const char* index = "") {
         const std::string offset = *index ? fmt::format(R"(<pIndex Offset="4">{}</pIndex>)", index) : "";
         nodes_ += fmt::format(
             R"(<IntReg Name="{}Reg"><Address>0x{:x}</Address>{}<Length>{}</Length><AccessMode>{}</AccessMode>)"
@@ -115,7 +116,8 @@ std::string device_description(const DescriptionOptions& options) {
     d.integer("HeightMax", reg_height_max, "", "RO");
     Choices formats;
     for (const PixelCode& code : pixel_codes())
-        if (options.pixel_formats.empty() || options.pixel_formats.contains(code.name)) formats.emplace_back(code.name, code.code);
+        if (options.pixel_formats.empty() || options.pixel_formats.contains(code.name))
+            formats.emplace_back(code.name, code.code);
     d.choice("PixelFormat", reg_pixel_format, formats);
     d.integer("PayloadSize", reg_payload_size, "", "RO");
     d.choice("AcquisitionMode", reg_acquisition_mode, {{"SingleFrame", 1}, {"Continuous", 0}});
@@ -123,7 +125,8 @@ std::string device_description(const DescriptionOptions& options) {
     d.command("AcquisitionStop", reg_acquisition_stop);
     d.choice("AcquisitionStatusSelector", reg_acquisition_status_selector, {{"AcquisitionActive", 0}});
     d.flag("AcquisitionStatus", reg_acquisition_status);
-    d.choice("TriggerSelector", reg_trigger_selector, {{"FrameStart", 0}, {"AcquisitionStart", 1}, {"FrameBurstStart", 2}});
+    d.choice("TriggerSelector", reg_trigger_selector,
+             {{"FrameStart", 0}, {"AcquisitionStart", 1}, {"FrameBurstStart", 2}});
     d.choice("TriggerMode", reg_trigger_mode, {{"Off", 0}, {"On", 1}}, "TriggerSelector");
     d.choice("TriggerSource", reg_trigger_source, {{"Software", 0}, {"Line1", 1}, {"Line2", 2}});
     d.choice("TriggerActivation", reg_trigger_activation, {{"RisingEdge", 0}, {"FallingEdge", 1}});
@@ -140,7 +143,8 @@ std::string device_description(const DescriptionOptions& options) {
     d.flag("ChunkEnable", reg_chunk_enable);
     d.chunk_time();
     // Of the transport (GigE Vision 2.0, stream channel packet size register): that there is a test packet, and the limits.
-    d.integer("GevSCPSPacketSize", 0x0d04, fmt::format("<Min>576</Min><Max>{}</Max><Inc>4</Inc>", options.packet_size_max));
+    d.integer("GevSCPSPacketSize", 0x0d04,
+              fmt::format("<Min>576</Min><Max>{}</Max><Inc>4</Inc>", options.packet_size_max));
     d.command("GevSCPSFireTestPacket", reg_test_packet);
     return d.xml();
 }

@@ -89,7 +89,8 @@ GigeDevice::GigeDevice(GigeOptions options) : options_(std::move(options)), memo
     put_text(first_url, url);
     put_word(interface_count, 1);
     put_word(stream_count, 1);
-    put_word(capability, 1u << 1 | (options_.resends ? 1u << 2 : 0) | 1u << 30);  // WRITEMEM, PACKETRESEND, serial number
+    put_word(capability,
+             1u << 1 | (options_.resends ? 1u << 2 : 0) | 1u << 30);  // WRITEMEM, PACKETRESEND, serial number
     put_word(heartbeat_ms, 30'000);
     put_word(tick_frequency, options_.ticks_hz, 8);
     put_word(stream_packet_size, 1500);
@@ -101,7 +102,7 @@ GigeDevice::GigeDevice(GigeOptions options) : options_(std::move(options)), memo
     put_word(reg_trigger_mode + 4, 1);  // AcquisitionStart: a user left it on
     put_word(reg_exposure_auto, 1);
     put_word(reg_trigger_source, 1);
-    put_word(reg_black_level, 64);
+    put_word(reg_black_level, uint32_t(options_.black_level));
     update_payload();
 
     stream_ = bound_socket(options_.address, 0, false);
@@ -179,7 +180,8 @@ void GigeDevice::serve() {
             if (!(wait.revents & POLLIN) || wait.fd == wake_[0]) continue;
             sockaddr_in from{};
             socklen_t size = sizeof from;
-            const ssize_t bytes = recvfrom(wait.fd, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
+            const ssize_t bytes =
+                recvfrom(wait.fd, packet.data(), packet.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
             if (bytes >= 8 && packet[0] == 0x42) answer(packet.data(), size_t(bytes), from, control_[0]);
         }
     }
@@ -245,7 +247,8 @@ bool GigeDevice::write_word(uint32_t address, uint32_t value, const sockaddr_in&
             return true;
         case reg_acquisition_stop: is_acquiring_ = false; return true;
         case reg_width:
-            if (int(value) > options_.width_max || value % uint32_t(options_.description.width_step)) return true;  // keeps its own
+            if (int(value) > options_.width_max || value % uint32_t(options_.description.width_step))
+                return true;  // keeps its own
             break;
         case stream_packet_size:
             if (value & fires_test_packet) {
@@ -287,7 +290,8 @@ bool GigeDevice::trigger(const std::string& line) {
     const std::lock_guard lock(mutex_);
     const uint64_t time_ns = next_ns();
     const bool is_its = line == (word(reg_trigger_source) == 1 ? "Line1" : "Line2");
-    const bool is_on = word(reg_trigger_mode) == 1 && word(reg_trigger_mode + 4) == 0 && word(reg_trigger_mode + 8) == 0;
+    const bool is_on =
+        word(reg_trigger_mode) == 1 && word(reg_trigger_mode + 4) == 0 && word(reg_trigger_mode + 8) == 0;
     if (!is_acquiring_ || !is_its || !is_on) return false;
     const uint64_t id = next_id_++;
     const PixelCode& format = pixel_code(word(reg_pixel_format));

@@ -21,7 +21,7 @@ namespace ols::test {
 
 struct GigeOptions {
     std::string address = "127.0.0.1", serial = "OLS1";
-    int width_max = 2048, height_max = 2048;
+    int width_max = 2048, height_max = 2048, black_level = 64;
     DescriptionOptions description;
     bool extended_ids = false, resends = true;
     uint64_t ticks_hz = 1'000'000'000;

@@ -47,7 +47,8 @@ std::vector<Packet> gvsp_packets(const GvspImage& image, const std::vector<uint8
     put(first, 0, 2);
     put(first, type, 2);
     put(first, image.ticks, 8);
-    for (const uint32_t word : {image.pixel_code, image.width, image.height, image.offset_x, image.offset_y}) put(first, word, 4);
+    for (const uint32_t word : {image.pixel_code, image.width, image.height, image.offset_x, image.offset_y})
+        put(first, word, 4);
     put(first, 0, 4);  // padding of rows and of the image
     packets.push_back(std::move(first));
     const size_t room = packet_bytes - ip_udp_bytes - (extended_ids ? 20 : 8);

@@ -9,17 +9,17 @@ namespace ols::test {
 const std::vector<PixelCode>& pixel_codes() {
     using P = PixelCode;
     static const std::vector<PixelCode> codes = {
-        {"Mono8", 0x01080001, 8, P::unpacked},        {"Mono10", 0x01100003, 10, P::unpacked},
-        {"Mono10Packed", 0x010C0004, 10, P::pairs},   {"Mono10p", 0x010A0046, 10, P::stream},
-        {"Mono12", 0x01100005, 12, P::unpacked},      {"Mono12Packed", 0x010C0006, 12, P::pairs},
-        {"Mono12p", 0x010C0047, 12, P::stream},       {"Mono16", 0x01100007, 16, P::unpacked},
-        {"BayerGR8", 0x01080008, 8, P::unpacked},     {"BayerRG8", 0x01080009, 8, P::unpacked},
-        {"BayerGB8", 0x0108000A, 8, P::unpacked},     {"BayerBG8", 0x0108000B, 8, P::unpacked},
-        {"BayerRG10", 0x0110000D, 10, P::unpacked},   {"BayerRG10Packed", 0x010C0027, 10, P::pairs},
-        {"BayerRG10p", 0x010A0058, 10, P::stream},    {"BayerRG12", 0x01100011, 12, P::unpacked},
+        {"Mono8", 0x01080001, 8, P::unpacked},         {"Mono10", 0x01100003, 10, P::unpacked},
+        {"Mono10Packed", 0x010C0004, 10, P::pairs},    {"Mono10p", 0x010A0046, 10, P::stream},
+        {"Mono12", 0x01100005, 12, P::unpacked},       {"Mono12Packed", 0x010C0006, 12, P::pairs},
+        {"Mono12p", 0x010C0047, 12, P::stream},        {"Mono16", 0x01100007, 16, P::unpacked},
+        {"BayerGR8", 0x01080008, 8, P::unpacked},      {"BayerRG8", 0x01080009, 8, P::unpacked},
+        {"BayerGB8", 0x0108000A, 8, P::unpacked},      {"BayerBG8", 0x0108000B, 8, P::unpacked},
+        {"BayerRG10", 0x0110000D, 10, P::unpacked},    {"BayerRG10Packed", 0x010C0027, 10, P::pairs},
+        {"BayerRG10p", 0x010A0058, 10, P::stream},     {"BayerRG12", 0x01100011, 12, P::unpacked},
         {"BayerGR12Packed", 0x010C002A, 12, P::pairs}, {"BayerRG12Packed", 0x010C002B, 12, P::pairs},
         {"BayerGB12Packed", 0x010C002C, 12, P::pairs}, {"BayerBG12p", 0x010C0053, 12, P::stream},
-        {"BayerRG12p", 0x010C0059, 12, P::stream},    {"BayerRG16", 0x0110002F, 16, P::unpacked},
+        {"BayerRG12p", 0x010C0059, 12, P::stream},     {"BayerRG16", 0x0110002F, 16, P::unpacked},
         {"RGB8", 0x02180014, 8, P::unpacked},
     };
     return codes;
@@ -54,8 +54,10 @@ std::vector<uint8_t> packed(const std::vector<uint16_t>& samples, const PixelCod
         }
     } else {
         for (size_t n = 0; n < count; ++n) {
-            if (format.bits == 8) bytes[n] = uint8_t(samples[n]);
-            else bytes[2 * n] = uint8_t(samples[n]), bytes[2 * n + 1] = uint8_t(samples[n] >> 8);
+            if (format.bits == 8)
+                bytes[n] = uint8_t(samples[n]);
+            else
+                bytes[2 * n] = uint8_t(samples[n]), bytes[2 * n + 1] = uint8_t(samples[n] >> 8);
         }
     }
     return bytes;

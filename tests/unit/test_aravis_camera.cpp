@@ -34,7 +34,8 @@ std::vector<uint16_t> truth(uint64_t id, size_t pixels, int bits) {
 
 // A camera that was set up as fits, with a way to change that.
 struct Opened {
-    explicit Opened(GigeOptions options = {}) : rig(std::move(options)), camera(rig.open()), wanted(rig.fitting_setup()) {}
+    explicit Opened(GigeOptions options = {})
+        : rig(std::move(options)), camera(rig.open()), wanted(rig.fitting_setup()) {}
     GigeDevice& device() { return rig.device(); }
 
     std::string set_up() {
@@ -100,7 +101,8 @@ TEST(AravisSetup, tells_layouts_by_their_names_and_knows_no_others) {
         {"BayerGB12Packed", {SamplePacking::gige_pairs, 12, Cfa::gbrg}},
         {"BayerBG16", {SamplePacking::words, 16, Cfa::bggr}}};
     for (const auto& [name, layout] : known) EXPECT_TRUE(sample_layout_of(name) == layout) << name;
-    for (const char* name : {"", "Mono", "Mono8s", "Mono9", "Mono8p", "Mono16p", "Mono14Packed", "RGB8", "Mono12pp", "BayerRG8 "})
+    for (const char* name :
+         {"", "Mono", "Mono8s", "Mono9", "Mono8p", "Mono16p", "Mono14Packed", "RGB8", "Mono12pp", "BayerRG8 "})
         EXPECT_FALSE(sample_layout_of(name).has_value()) << name;
 }
 
@@ -149,12 +151,24 @@ TEST(AravisSetup, names_keys_and_features_that_a_model_lacks) {
     o.wanted.trigger_delay_us = 3;
     o.wanted.trigger_activation = TriggerActivation::falling_edge;
     const std::string message = o.set_up();
-    for (const char* words : {"OLS Line OLS1", "it has no trigger_delay_us, leave it out", "it has no trigger_activation",
-                              "exposure_mode is timed and not trigger_width", "ExposureMode", "TriggerDelay", "TriggerActivation"})
+    for (const char* words :
+         {"OLS Line OLS1", "it has no trigger_delay_us, leave it out", "it has no trigger_activation",
+          "exposure_mode is timed and not trigger_width", "ExposureMode", "TriggerDelay", "TriggerActivation"})
         EXPECT_NE(message.find(words), std::string::npos) << words << ": " << message;
     o.wanted = o.rig.fitting_setup();
     o.wanted.exposure_mode = ExposureMode::timed;
     EXPECT_EQ(o.set_up(), "") << "what it lacks is not needed";
+}
+
+TEST(AravisSetup, sets_features_of_the_cameras_own_by_their_names) {
+    Opened o;
+    o.wanted.controls = {{"BlackLevel", "128"}, {"TriggerOverlap", "ReadOut"}, {"TriggerDelay", "0.0"}};
+    ASSERT_EQ(o.set_up(), "");
+    EXPECT_EQ(o.device().word(reg_black_level), 128u);
+    o.wanted.controls = {{"BlackLevel", "9999"}, {"NoSuchThing", "1"}, {"ExposureAuto", "Sometimes"}};
+    const std::string message = o.set_up();
+    for (const char* words : {"BlackLevel", "128", "it has no control \"NoSuchThing\"", "ExposureAuto", "Off"})
+        EXPECT_NE(message.find(words), std::string::npos) << words << ": " << message;
 }
 
 TEST(AravisSetup, lists_what_could_be_had_of_inputs_and_formats) {
@@ -189,7 +203,8 @@ TEST(AravisCamera, says_what_it_chose) {
     o.start();
     const CameraInfo info = o.camera->info();
     EXPECT_EQ(info.name, "OLS Line OLS1");
-    for (const char* words : {"GigE Vision", "packets of 89", "lost ones asked for again", "1024 buffers", "socket buffer of"})
+    for (const char* words :
+         {"GigE Vision", "packets of 89", "lost ones asked for again", "1024 buffers", "socket buffer of"})
         EXPECT_NE(info.link.find(words), std::string::npos) << words << ": " << info.link;
     EXPECT_EQ(info.setup.trigger_source, "Line1");
     o.device().trigger();
@@ -358,8 +373,10 @@ TEST(AravisTimes, of_a_camera_that_cannot_be_asked_are_bounded_by_zero_and_go_on
     for (const bool latches_nothing : {false, true}) {
         GigeOptions options;
         options.description.lacks = {"TimestampLatch"};
-        if (latches_nothing) options.clock_ns = [] { return uint64_t(5); };
-        else options.ticks_hz = 1'000'000'000;
+        if (latches_nothing)
+            options.clock_ns = [] { return uint64_t(5); };
+        else
+            options.ticks_hz = 1'000'000'000;
         Opened o(options);
         const uint64_t started_ns = o.start();
         if (latches_nothing) {
@@ -409,7 +426,8 @@ TEST(AravisOpen, a_name_that_nobody_has_is_answered_with_what_to_look_at) {
 
 TEST(AravisOpen, the_only_camera_needs_no_name_and_several_are_listed) {
     if (!is_alone) GTEST_SKIP() << "user namespaces are off: cameras of others may be on this network";
-    EXPECT_NE(error_of(open_camera("aravis:")).find("there is no GigE Vision or USB3 Vision camera"), std::string::npos);
+    EXPECT_NE(error_of(open_camera("aravis:")).find("there is no GigE Vision or USB3 Vision camera"),
+              std::string::npos);
     GigeOptions options;
     options.serial = "SN7";
     GigeRig one(options);

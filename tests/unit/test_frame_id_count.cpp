@@ -45,8 +45,10 @@ TEST(FrameIdCount, a_pause_of_the_triggers_is_no_gap_be_it_ever_so_long) {
 TEST(FrameIdCount, jitter_of_stamps_and_drift_of_the_clock_do_not_matter) {
     FrameIdCount count;
     uint64_t before = 0;
-    for (uint64_t n = 1; n <= 5000; ++n) before = count.unwrap(nth(n, n * period_ns * 1'000'020 / 1'000'000 + n * 7919 % 2000));
-    EXPECT_EQ(count.unwrap(nth(5000 + 65'535 + 17, (5000 + 65'535 + 17) * period_ns * 1'000'020 / 1'000'000)) - before, 65'552u);
+    for (uint64_t n = 1; n <= 5000; ++n)
+        before = count.unwrap(nth(n, n * period_ns * 1'000'020 / 1'000'000 + n * 7919 % 2000));
+    EXPECT_EQ(count.unwrap(nth(5000 + 65'535 + 17, (5000 + 65'535 + 17) * period_ns * 1'000'020 / 1'000'000)) - before,
+              65'552u);
 }
 
 TEST(FrameIdCount, a_late_frame_has_the_id_it_would_have_had) {
@@ -64,7 +66,8 @@ TEST(FrameIdCount, a_device_that_does_not_skip_zero_wraps_after_it) {
 
 TEST(FrameIdCount, ids_beyond_sixteen_bits_are_left_as_they_are) {
     FrameIdCount count;
-    for (const uint64_t id : {65'535ull, 65'536ull, 65'538ull, 1ull << 40}) EXPECT_EQ(count.unwrap({id, id * period_ns}), id);
+    for (const uint64_t id : {65'535ull, 65'536ull, 65'538ull, 1ull << 40})
+        EXPECT_EQ(count.unwrap({id, id * period_ns}), id);
 }
 
 }  // namespace ols

@@ -22,7 +22,8 @@ TEST(LibraryThread, calls_are_made_in_order_in_one_thread_and_answered) {
     std::thread::id first;
     library.post([&] { made += "a", first = std::this_thread::get_id(); });
     library.post([&] { made += "b"; });
-    const auto answer = library.run([&] { return made + (first == std::this_thread::get_id() ? "c" : "?"); }, surely_ms, never);
+    const auto answer =
+        library.run([&] { return made + (first == std::this_thread::get_id() ? "c" : "?"); }, surely_ms, never);
     EXPECT_EQ(answer, "abc");
 }
 

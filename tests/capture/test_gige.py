@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+# The virtual stage's camera over GigE Vision on the loopback: the same take as by its ring, and what Aravis' own tool sees of it.
+import os
+import subprocess
+
+import numpy as np
+
+from virtual_take import BIN, VirtualStage, identification, read_lamps, read_plane, sequence, target_file
+
+
+class Bridge:
+    """gige_bridge over a stage's ring, at an address of the loopback that no other test's process has; use it with `with`."""
+
+    def __init__(self, stage):
+        self.address = f"127.{1 + os.getpid() // 254 % 254}.{1 + os.getpid() % 254}.1"
+        command = [BIN / "gige_bridge", stage.folder / "cam0.ring", self.address]
+        self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def __enter__(self):
+        assert self.process.stdout.readline() == "ready\n"
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        assert self.process.wait(60) == 0
+
+
+def take(stage, archive, camera):
+    return stage.stagectl(
+        "run", "--sequence", sequence("s159"), "--cycles", 1, "--nominal", "-o", archive, "--json", camera=camera
+    )
+
+
+def features(address):
+    """What arv-tool reads of the camera's features."""
+    names = ["DeviceModelName", "Width", "Height", "PixelFormat", "TriggerMode", "TriggerSource"]
+    done = subprocess.run(
+        ["arv-tool-0.8", "-a", address, "control", *names], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(line.split(" = ") for line in done.stdout.splitlines() if " = " in line)
+
+
+def test_a_take_over_gige_vision_is_that_of_the_ring_bit_for_bit(tmp_path):
+    ring, gige = tmp_path / "ring.rfa", tmp_path / "gige.rfa"
+    with VirtualStage(tmp_path / "a", "card.toml") as stage:
+        take(stage, ring, True)
+    with VirtualStage(tmp_path / "b", "card.toml") as stage, Bridge(stage) as bridge:
+        assert features(bridge.address)["DeviceModelName"] == "Line"
+        report = take(stage, gige, f"aravis:{bridge.address}")
+        seen = features(bridge.address)  # as the take left it
+    assert report["slots_missing"] == 0
+    assert seen["Width"] == "64" and seen["Height"] == "48", seen
+    assert seen["PixelFormat"] in ("BayerRG12p", "BayerRG12Packed"), seen
+    assert seen["TriggerMode"] == "On", seen
+    for target in range(1):
+        for channel in "RGB":
+            assert np.array_equal(read_lamps(ring, target, channel), read_lamps(gige, target, channel))
+        assert np.array_equal(read_plane(ring, target, "mask"), read_plane(gige, target, "mask"))
+    assert not target_file(gige, 1).exists()
+    account = identification(gige)
+    assert "GigE Vision" in str(account), account
