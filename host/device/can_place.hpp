@@ -18,7 +18,6 @@ struct CanPlace {
 
     uint16_t to_board() const { return uint16_t(OLS_CANBUS_TO_BOARD + 16 * board_number); }
     uint16_t to_host() const { return uint16_t(OLS_CANBUS_TO_HOST + 16 * board_number); }
-    uint16_t state() const { return uint16_t(OLS_CANBUS_STATE + 16 * board_number); }
     std::string name() const;
 };
 

@@ -61,7 +61,7 @@ Result<std::unique_ptr<CanWatch>> CanWatch::open(const CanPlace& place) {
     if (!opened.ok()) return opened.error();
     std::unique_ptr<CanWatch> watch(new CanWatch(opened->fd, place));
     constexpr canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-    const can_filter ours[]{{place.to_board(), mask}, {place.to_host(), mask}, {place.state(), mask}};
+    const can_filter ours[]{{place.to_board(), mask}, {place.to_host(), mask}};
     const can_err_mask_t errors = CAN_ERR_CRTL | CAN_ERR_ACK | CAN_ERR_BUSOFF;
     if (::setsockopt(opened->fd, SOL_CAN_RAW, CAN_RAW_FILTER, ours, sizeof ours) != 0 ||
         ::setsockopt(opened->fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) != 0 ||
@@ -89,7 +89,7 @@ void CanWatch::look() {
 
 void CanWatch::forget() {
     look();
-    from_board_ = states_ = of_others_ = 0;
+    from_board_ = of_others_ = 0;
     waits_in_a_row_ = 0;
     interface_error_ = 0;
     has_sent_ = bus_off_ = passive_ = unacknowledged_ = false;
@@ -97,10 +97,6 @@ void CanWatch::forget() {
 
 void CanWatch::take(const can_frame& frame, bool is_local) {
     if (frame.can_id & CAN_ERR_FLAG) return take_error(frame);
-    if (frame.can_id == place_.state()) {
-        ++states_;
-        return;
-    }
     if (frame.can_id == place_.to_board()) {
         has_sent_ |= is_local;
         of_others_ += !is_local;

@@ -43,8 +43,6 @@ class CanWatch {
     void forget();
 
     uint64_t from_board() const { return from_board_; }  // ISO-TP frames
-    // The board's state, told every 50 ms of its own time and when it changes.
-    uint64_t states() const { return states_; }
     int waits_in_a_row() const { return waits_in_a_row_; }
     bool has_sent() const { return has_sent_; }  // a frame of ours was on the bus
 
@@ -58,7 +56,7 @@ class CanWatch {
 
     int fd_;
     CanPlace place_;
-    uint64_t from_board_ = 0, states_ = 0, of_others_ = 0;
+    uint64_t from_board_ = 0, of_others_ = 0;
     int waits_in_a_row_ = 0;
     int interface_error_ = 0;  // that it went down, or away
     bool has_sent_ = false, bus_off_ = false, passive_ = false, unacknowledged_ = false;

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <thread>
@@ -22,7 +23,9 @@ namespace ols {
 
 namespace {
 
-constexpr uint32_t state_us = 50'000;  // PROTOCOL.md, "CAN"
+// The kernel gives up by itself after a second without the board's frame and two without the bus', and says which: that comes
+// first.
+constexpr uint32_t kernel_timeout_us = 2'500'000;
 
 // A signal that does nothing but end a system call.
 int waking_signal() {
@@ -116,21 +119,21 @@ class KernelIsotp : public Transfer {
         return Done{};
     }
 
-    // Until `fd` is ready. The error says that the board did not do `what`: it said wait too often, or was otherwise busy for so
-    // long in its own time, which its states tell. When it is silent, the kernel or the deadline ends it.
+    // Until `fd` is ready. The error says that the board did not do `what`: it was silent for so long, or said wait too often.
     Status wait_for(int fd, uint32_t timeout_us, const Deadline& deadline, const char* what) {
-        const uint64_t states_max = 3 * (timeout_us / state_us);  // they also tell of changes
-        for (uint64_t states = watch_.states(), heard = watch_.from_board();;) {
+        using Clock = std::chrono::steady_clock;
+        const std::chrono::microseconds silence(std::max(timeout_us, kernel_timeout_us));
+        auto end = Clock::now() + silence;
+        for (uint64_t heard = watch_.from_board();;) {
             pollfd ready[]{{fd, POLLIN, 0}, {watch_.fd(), POLLIN, 0}};
-            ::poll(ready, 2, deadline.next_wait_ms());
+            const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()).count();
+            ::poll(ready, 2, int(std::clamp<int64_t>(left, 0, deadline.next_wait_ms())));
             if (ready[0].revents) return Done{};
             watch_.look();
-            if (watch_.from_board() != heard) {
-                heard = watch_.from_board();
-                states = watch_.states();
-            }
+            if (watch_.from_board() != heard) end = Clock::now() + silence;
+            heard = watch_.from_board();
             if (watch_.waits_in_a_row() > ISOTP_WAITS_MAX) return given_up(ISOTP_WAIT_OVERRUN);
-            if (watch_.states() - states > states_max || deadline.left_ms() == 0)
+            if (Clock::now() >= end || deadline.left_ms() == 0)
                 return fail(fmt::format("{} did not {} in time: reset it and start over", name(), what));
         }
     }

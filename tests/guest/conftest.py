@@ -13,6 +13,8 @@ import kernel  # noqa: E402
 from can_join import CanJoin  # noqa: E402
 from guest import Guest  # noqa: E402
 from ols_board import board as emulated_board  # noqa: E402
+from pacer import Pacer  # noqa: E402
+from usb_port import BoardCable, UsbPort  # noqa: E402
 
 STAGECTL = ROOT / "build/host/bin/stagectl"
 INSIDE = HERE / "inside"
@@ -36,17 +38,19 @@ def guest():
 
 
 @pytest.fixture
-def emulated():
-    """Starts emulated boards, on the host; their time is the wall's, or slower."""
+def emulated(guest):
+    """Starts emulated boards on the host, in step with the guest."""
     started = []
 
-    def start(*arguments, **options):
-        started.append(emulated_board.EmulatedBoard("--pace", "wall", *arguments, **options))
-        return started[-1]
+    def start(*arguments):
+        board = emulated_board.EmulatedBoard("--pace", "wall", *arguments, can=True)
+        started.append((board, Pacer(guest, board)))
+        return board
 
     yield start
-    for one in started:
-        one.__exit__()
+    for board, pacer in started:
+        pacer.close()
+        board.__exit__()
 
 
 class Bus:
@@ -108,6 +112,36 @@ def bus(guest, buses):
     yield begin
     for one in used:
         one.end()
+
+
+@pytest.fixture(scope="session")
+def port(guest):
+    """The guest's USB port, with udev at work as on a desktop, and no rules of ours."""
+    made = UsbPort(guest, INSIDE)
+    guest.run(["/lib/systemd/systemd-udevd", "--daemon"])
+    return made
+
+
+@pytest.fixture
+def usb(guest, port):
+    """Plugs boards in, and pulls the cable at the end."""
+
+    def plug(board):
+        port.plug(BoardCable(board))
+        settle(guest)
+        return port
+
+    yield plug
+    port.unplug()
+
+
+def settle(guest):
+    """Until udev has done what it has to for a device that came."""
+    for _ in range(1000):
+        found = guest.run(["sh", "-c", "udevadm settle; cat /sys/bus/usb/devices/*/product"]).stdout
+        if "light stage sequencer" in found:
+            return
+    raise TimeoutError("the board does not enumerate: " + guest.run(["dmesg"]).stdout[-2000:])
 
 
 @pytest.fixture

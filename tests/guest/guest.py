@@ -97,6 +97,7 @@ class Guest:
         self.numbers = itertools.count(1)
         self.processes, self.answers, self.channels = {}, {}, {}
         self.control, self.connected = None, threading.Event()
+        self.monitor, self.paused_at, self.paused_s = None, None, 0.0
         self.qemu = subprocess.Popen(self._command(cpus, memory_mb), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                      stderr=open(self._file("qemu"), "w"))
         threading.Thread(target=self._accept, daemon=True).start()
@@ -115,7 +116,7 @@ class Guest:
                 "-append", f"console=ttyS0 loglevel=4 panic=-1 -- {agent}", "-serial", "file:" + self._file("console"),
                 "-fsdev", "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap",
                 "-device", "virtio-9p-pci,fsdev=host,mount_tag=host",
-                "-netdev", "user,id=net", "-device", "virtio-net-pci,netdev=net,romfile="]
+                "-qmp", f"unix:{self._file('qmp')},server=on,wait=off", "-netdev", "user,id=net", "-device", "virtio-net-pci,netdev=net,romfile="]
 
     def _wait_for_agent(self):
         end = time.monotonic() + PATIENCE_S
@@ -124,6 +125,35 @@ class Guest:
                 told = pathlib.Path(self._file("qemu")).read_text() + self.console()
                 self.close()
                 raise kernel.Missing(f"the guest does not start: {told[-3000:]}")
+
+    def _monitor(self, command):
+        """QEMU's machine protocol: one command, once it has greeted."""
+        if self.monitor is None:
+            connection = socket.socket(socket.AF_UNIX)
+            connection.connect(self._file("qmp"))
+            self.monitor = connection.makefile("rw")
+            self.monitor.readline()
+            self._monitor("qmp_capabilities")
+        self.monitor.write(json.dumps({"execute": command}))
+        self.monitor.flush()
+        while "return" not in json.loads(self.monitor.readline()):
+            pass  # events
+
+    def elapsed_s(self):
+        """How far the guest's clock has come, which stands still while it is paused."""
+        now = time.monotonic() if self.paused_at is None else self.paused_at
+        return now - self.paused_s
+
+    def pause(self):
+        if self.paused_at is None and self.alive():
+            self._monitor("stop")
+            self.paused_at = time.monotonic()
+
+    def resume(self):
+        if self.paused_at is not None and self.alive():
+            self.paused_s += time.monotonic() - self.paused_at
+            self.paused_at = None
+            self._monitor("cont")
 
     def console(self):
         """What the guest's kernel said."""
@@ -188,12 +218,12 @@ class Guest:
         """`handler` gets the connections that programs in the guest open by this name (inside/host.py)."""
         self.channels[name] = handler
 
-    def start(self, argv, cwd=None, environment=None, user=None):
-        """A program in the guest, as root or as the user of that number."""
+    def start(self, argv, cwd=None, environment=None, user=None, groups=()):
+        """A program in the guest, as root or as the user of that number who is in those groups."""
         number = next(self.numbers)
         process = self.processes[number] = Process(self, number)
         self._send(do="run", id=number, argv=[str(part) for part in argv], cwd=str(cwd or os.getcwd()),
-                   environment=environment or {}, user=user)
+                   environment=environment or {}, user=user, groups=list(groups))
         return process
 
     def run(self, argv, timeout=PATIENCE_S, **options):

@@ -60,11 +60,11 @@ class Agent:
         with self.lock:
             self.control.sendall(json.dumps(answer).encode() + b"\n")
 
-    def run(self, number, argv, cwd, environment, user):
+    def run(self, number, argv, cwd, environment, user, groups):
         """A program whose standard input and output are one connection, its standard error another."""
         out, err = (connect(self.port, self.token, f"{kind} {number}") for kind in ("output", "errors"))
         try:
-            options = {"user": user, "group": user, "extra_groups": []} if user else {}
+            options = {"user": user, "group": user, "extra_groups": groups} if user else {}
             process = subprocess.Popen(argv, stdin=out, stdout=out, stderr=err, cwd=cwd, start_new_session=True,
                                        env=os.environ | environment, **options)
         except (OSError, subprocess.SubprocessError) as error:
