@@ -142,9 +142,7 @@ TEST_F(V4l2CameraTest, a_mosaic_and_bits_that_are_not_to_be_had_are_refused_with
     const std::string refusal = set_up(setup_of(Cfa::bggr, 10));
     EXPECT_TRUE(has(refusal, "cfa is none and not bggr")) << refusal;
     EXPECT_TRUE(has(refusal, "bits is 8 and not 10")) << refusal;
-    EXPECT_TRUE(
-        has(refusal, "GREY (8-bit Greyscale), RG12 (12-bit Bayer RGRG/GBGB); not read here: MJPG"))
-        << refusal;
+    EXPECT_TRUE(has(refusal, "GREY (8-bit Greyscale), RG12 (12-bit Bayer RGRG/GBGB); not read here: MJPG")) << refusal;
 }
 
 TEST_F(V4l2CameraTest, a_format_that_the_driver_changes_is_refused_by_its_name) {
