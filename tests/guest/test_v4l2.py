@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The V4L2 driver on the kernel's own devices: vivid for formats and faults, v4l2loopback for frames of ours; v4l2-ctl is the
-witness. No verdict depends on how fast the machine is: what did not come must have been counted."""
+"""The V4L2 driver on the kernel's own devices: vivid for formats and faults, v4l2loopback for frames of ours; v4l2-ctl is
+the witness. No verdict depends on how fast the machine is: what did not come must have been counted."""
 import base64
 import json
 import re
@@ -29,7 +29,8 @@ class CameraProgram:
     def wait_until(self, is_so):
         """Until what has come is so, or it has ended."""
         with self.process.changed:
-            assert self.process.changed.wait_for(lambda: is_so() or self.process.returncode is not None, 600), self.process.output
+            came = self.process.changed.wait_for(lambda: is_so() or self.process.returncode is not None, 600)
+        assert came, self.process.output
         return self
 
     def wait(self, count):
@@ -93,7 +94,8 @@ def loopback(guest):
     fed = []
 
     def feed(fourcc, width, height, sample_bytes, *numbered):
-        fed.append(guest.start([sys.executable, INSIDE / "feed_loopback.py", LOOPBACK, fourcc, width, height, sample_bytes, *numbered]))
+        feeder = [sys.executable, INSIDE / "feed_loopback.py"]
+        fed.append(guest.start([*feeder, LOOPBACK, fourcc, width, height, sample_bytes, *numbered]))
         fed[-1].wait_for("ready")
         return fed[-1]
 
@@ -110,9 +112,9 @@ def expect_gaps_are_counted(frames, end):
     assert end["missing_ids"] == ids[-1] - ids[0] + 1 - len(ids)
 
 
-FORMATS = [("GREY", "none", 8), ("Y10 ", "none", 10), ("Y12 ", "none", 12), ("RGGB", "rggb", 8), ("BA81", "bggr", 8), ("GRBG", "grbg", 8),
-           ("GBRG", "gbrg", 8), ("RG10", "rggb", 10), ("BG10", "bggr", 10), ("BG12", "bggr", 12), ("BA12", "grbg", 12), ("GB12", "gbrg", 12),
-           ("RG16", "rggb", 16), ("BYR2", "bggr", 16), ("Y16 ", "none", 16)]
+FORMATS = [("GREY", "none", 8), ("Y10 ", "none", 10), ("Y12 ", "none", 12), ("Y16 ", "none", 16), ("RGGB", "rggb", 8),
+           ("BA81", "bggr", 8), ("GRBG", "grbg", 8), ("GBRG", "gbrg", 8), ("RG10", "rggb", 10), ("BG10", "bggr", 10),
+           ("BG12", "bggr", 12), ("BA12", "grbg", 12), ("GB12", "gbrg", 12), ("RG16", "rggb", 16), ("BYR2", "bggr", 16)]
 
 
 def test_every_format_of_vivid_comes_as_v4l2_ctl_saves_it(guest, vivid, camera):
@@ -145,18 +147,21 @@ def test_a_size_that_the_driver_changes_is_refused_by_name(guest, vivid, camera)
 
 
 def test_controls_are_set_by_name_as_v4l2_ctl_reads_them(guest, vivid, camera):
-    controls = '{ Contrast = 90, gain_automatic = false, gain = 77, "Menu" = "Menu Item 4", "Integer 64 Bits" = -5000000000, String = "abc", "Integer Menu" = "13" }'
+    controls = ('{ Contrast = 90, gain_automatic = false, gain = 77, "Menu" = "Menu Item 4", String = "abc", '
+                '"Integer 64 Bits" = -5000000000, "Integer Menu" = "13" }')
     end = camera("v4l2:0", 1, **stage(), controls=controls).end()
     assert end.get("state") == "live", end
     read = vivid("-C", "contrast,gain_automatic,gain,menu,integer_64_bits,string,integer_menu")
-    for line in ("contrast: 90", "gain_automatic: 0", "gain: 77", "menu: 4", "integer_64_bits: -5000000000", "string: 'abc", "integer_menu: 6"):
+    for line in ("contrast: 90", "gain_automatic: 0", "gain: 77", "menu: 4", "integer_64_bits: -5000000000",
+                 "string: 'abc", "integer_menu: 6"):
         assert line in read, read
     error = camera("v4l2:0", 1, **stage(), controls='{ Contrast = 300, "Trigger Mode" = 1 }').end()["error"]
     assert 'control "Contrast" takes 0 to 255 in steps of 1, not 300' in error
     assert 'it has no control "Trigger Mode" (it has: "Brightness"' in error
 
 
-@pytest.mark.parametrize("source, words", [("0", "stamps at the end of the frame"), ("1", "stamps at the begin of the exposure")])
+@pytest.mark.parametrize("source, words", [("0", "stamps at the end of the frame"),
+                                           ("1", "stamps at the begin of the exposure")])
 def test_the_source_of_the_stamps_is_said(guest, vivid, camera, source, words):
     vivid("-c", f"timestamp_source={source}")
     program = camera("v4l2:0", 2, **stage())
@@ -228,8 +233,11 @@ def test_unplugged_while_idle_or_recording_it_is_gone(guest, vivid, camera):
 
 
 @pytest.mark.parametrize("fourcc, cfa, bits, width, height, count, rate_hz", [
-    ("GREY", "none", 8, 128, 128, 600, 200), ("GREY", "none", 8, 640, 480, 300, 100), ("RG12", "rggb", 12, 640, 480, 300, 60)])
-def test_every_frame_that_was_written_comes_or_is_counted(guest, loopback, camera, fourcc, cfa, bits, width, height, count, rate_hz):
+    ("GREY", "none", 8, 128, 128, 600, 200),
+    ("GREY", "none", 8, 640, 480, 300, 100),
+    ("RG12", "rggb", 12, 640, 480, 300, 60)])
+def test_every_frame_that_was_written_comes_or_is_counted(guest, loopback, camera, fourcc, cfa, bits, width, height, count,
+                                                         rate_hz):
     feeder = loopback(fourcc, width, height, (bits + 7) // 8, count, rate_hz)
     program = camera(f"v4l2:{LOOPBACK}", f"@{count}", **stage(cfa, bits, width, height))
     program.process.wait_for("started_ns")

@@ -19,7 +19,7 @@ def main():
     width, height, sample_bytes = map(int, numbers[:3])
     size = width * height * sample_bytes
     fd = os.open(device, os.O_RDWR)
-    pix = struct.pack("<II4sIIIIIIIIII", width, height, fourcc.encode(), FIELD_NONE, width * sample_bytes, size, 8, *[0] * 6)
+    pix = struct.pack("<II4sIII", width, height, fourcc.encode(), FIELD_NONE, width * sample_bytes, size)
     taken = bytearray(struct.pack("<I4x", OUTPUT) + pix.ljust(200, b"\0"))
     fcntl.ioctl(fd, VIDIOC_S_FMT, taken)
     got = struct.unpack_from("<II4s", taken, 8)
