@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// stagectl-ingest, which `stagectl ingest` becomes: a folder of photographs and an .lp file become an archive. The libraries that read
-// photographs take longer to load than most verbs of stagectl to run.
+// stagectl-ingest, which `stagectl ingest` becomes: a folder of photographs and an .lp file, or a recording and its sequence, become an
+// archive. The libraries that read pictures take longer to load than most verbs of stagectl to run.
 #include "photographs/ingest.hpp"
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "image/freed_planes.hpp"
+#include "ingest/recording_verb.hpp"
 #include "program.hpp"
 
 namespace ols {
@@ -102,11 +103,17 @@ void add_options(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
     ols::keep_freed_planes();  // pictures are of one size
-    CLI::App app{"make an archive from photographs, one a lamp, and an .lp file"};
+    int exit_code = 0;
+    CLI::App recordings;
+    recordings.name("stagectl ingest");
+    ols::add_recording_options(recordings, exit_code);
+    if (ols::is_recording(argc, argv)) return ols::run_program(recordings, argc, argv, exit_code);
+    CLI::App app{
+        "make an archive from photographs, one a lamp, and an .lp file; or from a recording (--sequence, below)"};
     app.name("stagectl ingest");
     ols::Options options;
     ols::add_options(app, options);
-    int exit_code = 0;
+    app.footer(app.get_footer() + "\n\n" + recordings.help());
     app.callback([&] {
         const auto status = ols::run(options);
         if (status) return;

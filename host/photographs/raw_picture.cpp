@@ -65,6 +65,13 @@ double black_at(LibRaw& raw, int x, int y) {
     return black;
 }
 
+// The samples of a crop, row by row.
+const uint16_t* raw_row(const libraw_data_t& data, const Crop& crop, int y) {
+    const size_t pitch = data.sizes.raw_pitch / sizeof(uint16_t);
+    return data.rawdata.raw_image + (size_t(data.sizes.top_margin) + crop.y + y) * pitch + data.sizes.left_margin +
+           crop.x;
+}
+
 Result<RawPicture> read_mosaic(LibRaw& raw, const std::string& path) {
     const auto& data = raw.imgdata;
     const Crop crop = crop_of(data, path);
@@ -75,10 +82,8 @@ Result<RawPicture> read_mosaic(LibRaw& raw, const std::string& path) {
     picture.cfa = *cfa;
     picture.light = Image(crop.width, crop.height, 1);
     const double white = data.color.maximum;
-    const size_t pitch = data.sizes.raw_pitch / sizeof(uint16_t);
     for (int y = 0; y < crop.height; ++y) {
-        const uint16_t* row = data.rawdata.raw_image + (size_t(data.sizes.top_margin) + crop.y + y) * pitch +
-                              data.sizes.left_margin + crop.x;
+        const uint16_t* row = raw_row(data, crop, y);
         for (int x = 0; x < crop.width; ++x) {
             const double black = black_at(raw, crop.x + x, crop.y + y);
             if (!(white > black))
@@ -139,8 +144,10 @@ bool is_camera_raw(const std::string& path) {
     return raw.open_file(path.c_str()) == LIBRAW_SUCCESS;
 }
 
-Result<RawPicture> read_raw(const std::string& path, RawUse use) {
-    const auto raw = std::make_unique<LibRaw>();  // some hundred kilobytes
+namespace {
+
+Result<std::unique_ptr<LibRaw>> unpack_raw(const std::string& path) {
+    auto raw = std::make_unique<LibRaw>();  // some hundred kilobytes
     const auto failed = [&](int error) { return fail("cannot read '" + path + "' as raw: " + libraw_strerror(error)); };
     if (const int error = raw->open_file(path.c_str()); error != LIBRAW_SUCCESS) return failed(error);
     const auto& sizes = raw->imgdata.sizes;
@@ -150,10 +157,45 @@ Result<RawPicture> read_raw(const std::string& path, RawUse use) {
     raw->set_dataerror_handler([](void* count, const char*, int) { ++*static_cast<int*>(count); }, &damage);
     if (const int error = raw->unpack(); error != LIBRAW_SUCCESS) return failed(error);
     if (damage > 0) return fail("'" + path + "' is damaged: copy it again");
-    const int orientation = orientation_of(sizes.flip);
-    auto picture = use == RawUse::mosaic ? read_mosaic(*raw, path) : read_rgb(*raw, path);
+    return raw;
+}
+
+}  // namespace
+
+Result<RawPicture> read_raw(const std::string& path, RawUse use) {
+    const auto raw = unpack_raw(path);
+    if (!raw.ok()) return raw.error();
+    const int orientation = orientation_of((*raw)->imgdata.sizes.flip);
+    auto picture = use == RawUse::mosaic ? read_mosaic(**raw, path) : read_rgb(**raw, path);
     if (picture.ok()) picture->orientation = orientation;
     return picture;
+}
+
+Result<RawCounts> read_raw_counts(const std::string& path) {
+    const auto unpacked = unpack_raw(path);
+    if (!unpacked.ok()) return unpacked.error();
+    LibRaw& raw = **unpacked;
+    const auto& data = raw.imgdata;
+    const Crop crop = crop_of(data, path);
+    const bool is_grey = data.idata.filters == 0 && data.idata.colors == 1;
+    const auto cfa = is_grey ? Cfa::none : bayer_at(raw, crop.x, crop.y);
+    if (!cfa || !data.rawdata.raw_image)
+        return fail("'" + path + "' holds no Bayer mosaic and no grey samples of integers: a recording is of these");
+    RawCounts counts{crop.width, crop.height, {}, *cfa, 0, double(data.color.maximum)};
+    for (int place = 0; place < 4; ++place) {
+        const double black = black_at(raw, crop.x + place % 2, crop.y + place / 2);
+        counts.has_one_black &= place == 0 || black == counts.black / place;
+        counts.black += black;
+    }
+    counts.black /= 4;
+    if (!(counts.white > counts.black))
+        return fail(fmt::format("'{}' says that white ({:g}) is not above black ({:g}): it is damaged", path,
+                                counts.white, counts.black));
+    for (int y = 0; y < crop.height; ++y) {
+        const uint16_t* row = raw_row(data, crop, y);
+        counts.counts.insert(counts.counts.end(), row, row + crop.width);
+    }
+    return counts;
 }
 
 }  // namespace ols

@@ -28,7 +28,8 @@ void become(const std::string& program, std::vector<std::string> arguments) {
 }  // namespace
 
 void add_ingest_verb(CLI::App& app, int& exit_code) {
-    CLI::App* verb = app.add_subcommand("ingest", "make an archive from photographs, one a lamp, and an .lp file");
+    CLI::App* verb = app.add_subcommand(
+        "ingest", "make an archive from photographs and an .lp file, or from a recording in a camera's own memory");
     verb->set_help_flag();
     verb->prefix_command();
     verb->callback([verb, &exit_code] {

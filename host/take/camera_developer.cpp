@@ -113,7 +113,7 @@ void CameraDeveloper::develop() {
 
 TargetOutcome CameraDeveloper::develop(const Job& job) {
     TargetOutcome outcome{camera_, job.index, nullptr, "", {}};
-    outcome.detail = std::visit([&](const auto& frames) { return provenance_of(frames, take_.sequence); }, job.frames);
+    outcome.detail = std::visit([&](const auto& frames) { return provenance_of(frames, take_); }, job.frames);
     auto target = guarded("cannot develop it",
                           [&] { return std::visit([&](const auto& frames) { return develop(frames); }, job.frames); });
     if (!target.ok()) {

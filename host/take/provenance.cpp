@@ -2,6 +2,8 @@
 // Frames, sequence and identification as JSON.
 #include "take/provenance.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "record/record_json.hpp"
@@ -9,8 +11,6 @@
 namespace ols {
 
 namespace {
-
-const char* const witnesses[] = {"board log", "camera id and time", "optical code"};
 
 // Noise variance of a recovered image over that of one row image, mean over lamps, for noise that does not depend on light.
 double noise_gain(const Basis& basis) {
@@ -47,8 +47,9 @@ nlohmann::json describe_motion(const Sequence& sequence, const TakeTargets& targ
 
 }  // namespace
 
-nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence) {
-    nlohmann::json json = {{"cycle", frames.cycle}, {"witnesses", witnesses}};
+nlohmann::json provenance_of(const CycleFrames& frames, const TakeDescription& take) {
+    const Sequence& sequence = take.sequence;
+    nlohmann::json json = {{"cycle", frames.cycle}, {"witnesses", take.witnesses}};
     int used = 0;
     for (const auto& frame : frames.slots) {
         if (!frame) continue;
@@ -66,11 +67,12 @@ nlohmann::json provenance_of(const CycleFrames& frames, const Sequence& sequence
     return json;
 }
 
-nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequence) {
+nlohmann::json provenance_of(const TargetFrames& frames, const TakeDescription& take) {
+    const Sequence& sequence = take.sequence;
     const uint64_t length = sequence.slots.size();
     nlohmann::json json = {{"cycle", frames.basis.target / length},
                            {"slot", frames.basis.target % length},
-                           {"witnesses", witnesses},
+                           {"witnesses", take.witnesses},
                            {"basis_slots", sequence.basis.rows},
                            {"frames", frames.frames.size() + frames.tracking.size()},
                            {"matte_frames", frames.matte.size()},
@@ -90,14 +92,34 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
     return json;
 }
 
-nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
+nlohmann::json origin_of(const Board& board) {
+    return {{"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}}};
+}
+
+nlohmann::json origin_of(const RecordedFrames& frames, const RecordingPlace& place, const Sequence& sequence) {
+    const RecordingFacts& facts = frames.facts();
+    return {{"recording",
+             {{"frames", facts.frames()},
+              {"first_number", facts.numbers.front()},
+              {"last_number", facts.numbers.back()},
+              {"times", facts.has_times ? "the camera's" : "number times period"},
+              {"first_slot", place.first_slot},
+              {"cycles",
+               "counted from the first whole one of the recording; which one of the play that was cannot be known"},
+              {"ticks", fmt::format("made up: the trigger's number from cycle 0 on times {} ticks",
+                                    sequence.slots.front().period_ticks)},
+              {"said", facts.said},
+              {"file", facts.detail}}}};
+}
+
+nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const nlohmann::json& origin,
                              const RecordReport& record, const std::vector<nlohmann::json>& missing) {
     nlohmann::json identification = record_json(record);
     for (size_t n = 0; n < missing.size(); ++n) identification["cameras"][n]["missing"] = missing[n];
     nlohmann::json json = {{"sequence", describe_sequence(take.sequence)},
-                           {"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}},
                            {"calibration", take.calibration.source},
                            {"identification", std::move(identification)}};
+    json.update(origin);
     if (targets.every > 0) json["motion"] = describe_motion(take.sequence, targets);
     return json;
 }

@@ -71,10 +71,10 @@ class Output {
         return report;
     }
 
-    Status finish(const TakeDescription& take, const Board& board, const RecordReport& record) {
+    Status finish(const TakeDescription& take, const nlohmann::json& origin, const RecordReport& record) {
         std::vector<nlohmann::json> missing;
         for (const CameraDeveloper& developer : developers_) missing.push_back(developer.missing_json());
-        archive_.add_to_manifest(describe_take(take, targets_, board, record, missing));
+        archive_.add_to_manifest(describe_take(take, targets_, origin, record, missing));
         return archive_.finish();
     }
 
@@ -136,14 +136,13 @@ std::optional<double> measured_black(const Calibration& calibration, size_t came
     return std::accumulate(black.begin(), black.end(), 0.0) / double(black.size());
 }
 
-Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
-                            const std::atomic<bool>& stop) {
-    const size_t cameras = devices.cameras.size();
-    if (cameras == 0 || cameras != take.stage.cameras.size())
-        return fail(
-            fmt::format("the stage has {} cameras, and {} are there: a take needs them all, or a stage without "
-                        "the others' [[camera]]",
-                        take.stage.cameras.size(), cameras));
+namespace {
+
+// `record_into` records into the cameras' sinks, from whatever the take comes.
+template <typename Record>
+Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::json& origin, const TakeSinks& sinks,
+                                const Record& record_into) {
+    const size_t cameras = take.stage.cameras.size();
     const auto start = std::chrono::steady_clock::now();
     std::vector<std::unique_ptr<Output>> outputs;
     for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output));
@@ -159,29 +158,56 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
             for (const auto& output : outputs) output->take_place();
         sinks.identified(frame);
     };
-    std::vector<RecordedCamera> recorded;
+    std::vector<RecordSink> camera_sinks;
     for (size_t camera = 0; camera < cameras; ++camera) {
         const auto progress = [&, camera](uint64_t done, uint64_t total) {
             const std::lock_guard lock(mutex);
             decided[camera] = done;
             sinks.progress(*std::ranges::min_element(decided), total);
         };
-        recorded.push_back({*devices.cameras[camera], uint32_t(camera), measured_black(take.calibration, camera),
-                            sink_of(camera, outputs, cycles_kept(take.masks, sinks.outputs), identified, progress)});
+        camera_sinks.push_back(sink_of(camera, outputs, cycles_kept(take.masks, sinks.outputs), identified, progress));
     }
     TakeReport report;
-    const auto record = record_take(devices.board, recorded, take.sequence, take.stage, stop);
+    const Result<RecordReport> record = record_into(camera_sinks);
     for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);
     report.record = *record;
     for (size_t n = 0; n < outputs.size(); ++n) {
-        const Status finished = outputs[n]->finish(take, devices.board, *record);
+        const Status finished = outputs[n]->finish(take, origin, *record);
         if (!finished.ok() && report.outputs[n].write_error.empty())
             report.outputs[n].write_error = finished.error().message;
     }
     report.seconds_total = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return report;
+}
+
+}  // namespace
+
+Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
+                            const std::atomic<bool>& stop) {
+    const size_t cameras = devices.cameras.size();
+    if (cameras == 0 || cameras != take.stage.cameras.size())
+        return fail(
+            fmt::format("the stage has {} cameras, and {} are there: a take needs them all, or a stage without "
+                        "the others' [[camera]]",
+                        take.stage.cameras.size(), cameras));
+    return develop_take(take, origin_of(devices.board), sinks, [&](const std::vector<RecordSink>& camera_sinks) {
+        std::vector<RecordedCamera> recorded;
+        for (size_t camera = 0; camera < cameras; ++camera)
+            recorded.push_back({*devices.cameras[camera], uint32_t(camera), measured_black(take.calibration, camera),
+                                camera_sinks[camera]});
+        return record_take(devices.board, recorded, take.sequence, take.stage, stop);
+    });
+}
+
+Result<TakeReport> ingest_take(const TakeDescription& take, const RecordedFrames& frames, const RecordingPlace& place,
+                               const TakeSinks& sinks, const std::atomic<bool>& stop) {
+    return develop_take(take, origin_of(frames, place, take.sequence), sinks,
+                        [&](const std::vector<RecordSink>& camera_sinks) {
+                            return record_files(frames, place, take.sequence, take.stage.cameras[0],
+                                                measured_black(take.calibration, 0), camera_sinks[0], stop);
+                        });
 }
 
 }  // namespace ols

@@ -10,6 +10,7 @@
 #include "archive/archive.hpp"
 #include "develop/develop.hpp"
 #include "develop/motion_developer.hpp"
+#include "record/file_recording.hpp"
 #include "record/recorder.hpp"
 #include "stage/calibration.hpp"
 
@@ -36,6 +37,7 @@ struct TakeDescription {
     StageConfig stage;
     Calibration calibration;  // of the stage's cameras, in their order
     TakeMasks masks;
+    std::vector<std::string> witnesses = {"board log", "camera id and time", "optical code"};  // that every frame has
 };
 
 // What it is recorded with.
@@ -84,6 +86,14 @@ struct TakeReport {
 // is no archive. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
                             const std::atomic<bool>& stop);
+
+// Develops a recording that lies in files in the same way; `take` has as many cycles as `place` (record/file_recording.hpp), and one
+// camera. Errors: not one frame has its slot. Then there is no archive.
+Result<TakeReport> ingest_take(const TakeDescription& take, const RecordedFrames& frames, const RecordingPlace& place,
+                               const TakeSinks& sinks, const std::atomic<bool>& stop);
+
+// What such a take's manifest says of its recording, {"recording": ...}.
+nlohmann::json origin_of(const RecordedFrames& frames, const RecordingPlace& place, const Sequence& sequence);
 
 // The mean black level of a camera's calibration, for the optical code; nothing for a nominal one.
 std::optional<double> measured_black(const Calibration& calibration, size_t camera);

@@ -25,12 +25,13 @@ UPSTREAM = {
     "photographs": {"image", "stage", "archive"},
     "device": {"image", "stage"},
     "record": {"image", "stage", "device"},
+    "recordings": {"image", "stage", "record", "photographs"},
     "flow": {"image"},
     "demultiplex": {"stage"},
     "develop": {"image", "stage", "flow", "demultiplex"},
     "take": {"image", "stage", "device", "record", "develop", "archive"},
     "relight": {"image", "stage"},
-    "ingest": {"image", "photographs"},
+    "ingest": {"image", "stage", "photographs", "record", "recordings", "take", "stagectl"},
     "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take"},
 }
 # Which rooms of host/ a program of tools/ may include.

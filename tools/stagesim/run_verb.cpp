@@ -23,7 +23,7 @@ struct RunOptions {
     InputOptions inputs;
     std::string work, image, vcd, pace = "virtual", faults, camera_model = "on", board_program;
     std::vector<std::string> board_faults;
-    bool once = false, no_board = false, json = false;
+    bool once = false, no_board = false, keep_frames = false, json = false;
 };
 
 // With --once, board time without exposures after the USB client has gone that counts as the end.
@@ -115,6 +115,11 @@ class StageRun {
                                                            fmt::format("{}/cam{}.frames.jsonl", options_.work, index),
                                                            faults, options_.pace == "virtual", stop_requested));
         if (const Status told = cameras_.back()->truth_written(); !told) return told;
+        if (options_.keep_frames)
+            if (const Status kept =
+                    cameras_.back()->keep_frames(fmt::format("{}/cam{}.frames.bin", options_.work, index));
+                !kept)
+                return kept;
         starts_.emplace_back();
         Renderer& renderer = cameras_.back()->renderer();
         // The board starts when the lamps are done: its socket says that the stage is ready. A moving scene is looked at once, so
@@ -270,6 +275,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
         ->check(CLI::IsMember({"on", "off"}));
     verb->add_option("--board-program", options->board_program, "the emulated board's board.mjs");
     verb->add_flag("--no-board", options->no_board, "wait for a board that connects to WORK/exposures.sock by itself");
+    verb->add_flag("--keep-frames", options->keep_frames,
+                   "keep every frame in WORK/camN.frames.bin, too: id and time (64 bits each), then 16-bit samples");
     verb->add_flag("--once", options->once, "end when the board's USB client has gone and the board is idle");
     verb->add_flag("--json", options->json, "print the cost as JSON at the end");
     verb->callback([options, &exit_code] {

@@ -95,9 +95,36 @@ void VirtualCamera::write_truth(const CameraStamp& stamp, uint64_t trigger, uint
                                  stamp.frame_id, stamp.timestamp_ns, trigger, tick, fmt::join(lit, ",")));
 }
 
+Status VirtualCamera::keep_frames(const std::string& path) {
+    kept_frames_.open(path, std::ios::binary);
+    if (!kept_frames_) return fail("cannot write '" + path + "': check its folder");
+    return Done{};
+}
+
+void VirtualCamera::keep(const Frame& frame) {
+    if (!kept_frames_.is_open()) return;
+    const uint64_t stamp[] = {frame.stamp.frame_id, frame.stamp.timestamp_ns};
+    const size_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+    const size_t row_bytes = size_t(frame.width) * size_t(samples_per_pixel(frame.cfa)) * sample_bytes;
+    kept_frames_.write(reinterpret_cast<const char*>(stamp), sizeof stamp);
+    for (size_t y = 0; y < frame.height; ++y)
+        kept_frames_.write(reinterpret_cast<const char*>(frame.samples.data() + y * frame.pitch_bytes),
+                           std::streamsize(row_bytes));
+    kept_frames_.flush();
+}
+
+Status VirtualCamera::truth_written() const {
+    if (kept_frames_.is_open() && !kept_frames_)
+        return fail("the frames that are kept could not all be written: free space");
+    return frames_file_.status();
+}
+
 void VirtualCamera::deliver(Frame frame) {
     switch (ring_.write(frame, wait_for_reader_, cancelled_)) {
-        case RingWriter::Outcome::written: ++delivered_; break;
+        case RingWriter::Outcome::written:
+            ++delivered_;
+            keep(frame);
+            break;
         case RingWriter::Outcome::unwanted: ++unwanted_; break;
         case RingWriter::Outcome::full:
         case RingWriter::Outcome::cancelled: ++dropped_; break;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <fstream>
 #include <memory>
 #include <string>
 
@@ -34,6 +35,10 @@ class VirtualCamera {
                   const std::string& frames_path, const std::vector<Fault>& faults, bool wait_for_reader,
                   const std::atomic<bool>& cancelled);
 
+    // From now on every frame that goes into the ring is kept in this file, too: its id and time, 64 bits little-endian each, and its
+    // rows without gaps.
+    Status keep_frames(const std::string& path);
+
     Renderer& renderer() { return renderer_; }
     // Steps for an exposure of this camera's trigger; scene time is counted from the first trigger. A frame that nobody wants
     // is counted, and not rendered.
@@ -49,11 +54,12 @@ class VirtualCamera {
     uint64_t delivered() const { return delivered_; }
     uint64_t dropped() const { return dropped_; }
     uint64_t unwanted() const { return unwanted_; }
-    // The first error of writing `frames_path`.
-    Status truth_written() const { return frames_file_.status(); }
+    // The first error of writing `frames_path`, or frames that are kept.
+    Status truth_written() const;
 
   private:
     void deliver(Frame frame);
+    void keep(const Frame& frame);
     uint64_t time_ns(uint64_t tick) const;
     void write_truth(const CameraStamp& stamp, uint64_t trigger, uint64_t tick, const std::vector<double>& lit_us);
 
@@ -62,6 +68,7 @@ class VirtualCamera {
     uint32_t index_;
     RingWriter ring_;
     LineFile frames_file_;
+    std::ofstream kept_frames_;
     FaultyDelivery delivery_;
     bool wait_for_reader_;
     const std::atomic<bool>& cancelled_;

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// What became of a take, for people and as JSON.
+#include <fmt/format.h>
+
+#include "program.hpp"
+#include "record/record_json.hpp"
+#include "stagectl/take_options.hpp"
+
+namespace ols {
+
+namespace {
+
+nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
+    return {{"archive", archive},
+            {"targets_written", report.targets_written},
+            {"targets_missing", report.targets_missing},
+            {"write_error", report.write_error},
+            {"saturated_share", report.saturated_share},
+            {"estimated_share", report.estimated_share},
+            {"unsolved_share", report.unsolved_share},
+            {"misaligned_share", report.misaligned_share},
+            {"seconds",
+             {{"develop", report.seconds_develop},
+              {"flow", report.seconds_motion.flow},
+              {"planes", report.seconds_motion.planes},
+              {"invert", report.seconds_motion.invert},
+              {"matte", report.seconds_motion.matte},
+              {"write", report.seconds_write}}}};
+}
+
+// The first archive's account with the recording's; those of --also in "also".
+nlohmann::json to_json(const TakeReport& report, const std::vector<PlannedArchive>& planned) {
+    nlohmann::json json = to_json(report.outputs[0], planned[0].path);
+    json.update(record_json(report.record));
+    json["host_clock"] = report.record.host_clock ? clock_record(*report.record.host_clock) : nlohmann::json();
+    json["seconds"]["total"] = report.seconds_total;
+    for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));
+    return json;
+}
+
+void print_output(const OutputReport& report, const std::string& folder, const TakeOptions& options) {
+    if (!options.json)
+        fmt::print("{}: {} targets written, {} missing\n", folder, report.targets_written, report.targets_missing);
+    if (report.unsolved_share > 0)
+        fmt::print(
+            stderr,
+            "stagectl: {:.2g} % of the pixels have too few samples left, and are 0 and masked: {}--estimate smooth or "
+            "nonnegative estimate lost ones{}\n",
+            report.unsolved_share * 100,
+            options.estimate == "clipped" ? "" : "--estimate clipped counts saturated ones as they were read, ",
+            options.estimate == "clipped" ? "" : " too");
+    if (report.misaligned_share > 0)
+        fmt::print(stderr,
+                   "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",
+                   report.misaligned_share * 100);
+    if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
+    if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
+}
+
+void print_camera(const CameraReport& camera, const std::string& name) {
+    if (!camera.end.empty())
+        fmt::print(stderr, "stagectl: {}{} ({})\n", name, camera.end.text, cause_words(camera.end.cause));
+    if (camera.missing.total() > 0)
+        fmt::print(stderr, "stagectl: {}{} slots missing: {}\n", name, camera.missing.total(),
+                   camera.missing.to_words());
+    if (camera.stale_buffers > 0)
+        fmt::print(stderr,
+                   "stagectl: {}{} frames had the samples of an earlier one, bit for bit; their slots are missing: the "
+                   "camera's driver or grabber hands out old buffers\n",
+                   name, camera.stale_buffers);
+    if (!camera.unfit_frame.empty())
+        fmt::print(stderr, "stagectl: {}frames came as {}, which is not what the stage says of its camera\n", name,
+                   camera.unfit_frame);
+}
+
+void print_report(const TakeReport& report, bool is_estimate, const std::vector<PlannedArchive>& planned,
+                  const TakeOptions& options) {
+    const RecordReport& record = report.record;
+    const uint64_t missing = record.missing().total();
+    for (size_t n = 0; n < planned.size(); ++n) print_output(report.outputs[n], planned[n].archive.folder(), options);
+    if (!options.json)
+        fmt::print("{} of {} slots missing; {:.1f} s\n", missing, record.slots_total * record.cameras.size(),
+                   report.seconds_total);
+    if (!record.board_end.empty())
+        fmt::print(stderr, "stagectl: {} ({})\n", record.board_end.text, cause_words(record.board_end.cause));
+    for (const CameraReport& camera : record.cameras)
+        print_camera(camera, record.cameras.size() > 1 ? fmt::format("camera {}: ", camera.index) : "");
+    if (report.outputs[0].saturated_share > 0)
+        fmt::print(stderr,
+                   "stagectl: {:.2g} % of the pixels have saturated samples, which are left out where others make up "
+                   "for them: shorten the exposure\n",
+                   report.outputs[0].saturated_share * 100);
+    if (is_estimate)
+        fmt::print(stderr,
+                   "stagectl: the basis has fewer independent rows than lamps: what was written is an estimate\n");
+    if (missing > 0)
+        fmt::print(stderr,
+                   "stagectl: why slots are missing stands in {}/manifest.json, identification.cameras[].missing\n",
+                   planned[0].archive.folder());
+}
+
+}  // namespace
+
+Result<int> finish_take(const TakeReport& report, bool is_estimate, const std::vector<PlannedArchive>& planned,
+                        const TakeOptions& options, std::optional<LineFile>& account, const nlohmann::json& origin) {
+    print_report(report, is_estimate, planned, options);
+    if (options.json) {
+        nlohmann::json json = to_json(report, planned);
+        json.update(origin);
+        print_json(json);
+    }
+    // The take is finished first, whatever became of its account.
+    if (account)
+        if (const Status told = account->finish(); !told.ok()) return told.error();
+    int missing = 0;
+    for (const OutputReport& output : report.outputs) {
+        if (!output.write_error.empty()) return 1;
+        missing += output.targets_missing;
+    }
+    return missing > 0 || report.record.missing().total() > 0 ? 2 : 0;
+}
+
+}  // namespace ols
