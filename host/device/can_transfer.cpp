@@ -143,7 +143,7 @@ Result<std::unique_ptr<Transfer>> open_can(const std::string& link, const Deadli
         board_number = unsigned(std::stoi(text));
     }
     const auto id = uint16_t(OLS_CANBUS_TO_HOST + 16 * board_number);
-    auto bus = link.starts_with("can:") ? open_socketcan(place, id) : open_can_socket(place, deadline);
+    auto bus = link.starts_with("can:") ? open_socketcan(place, {id}) : open_can_socket(place, deadline);
     if (!bus.ok()) return bus.error();
     return can_transfer(std::move(*bus), board_number);
 }

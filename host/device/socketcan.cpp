@@ -74,7 +74,7 @@ class SocketCan : public CanBus {
 
 }  // namespace
 
-Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uint16_t id) {
+Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, CanIds ids) {
     ifreq request{};
     if (interface.empty() || interface.size() >= sizeof request.ifr_name)
         return fail("'" + interface + "' is no name of a network interface: see `ip link`");
@@ -83,7 +83,7 @@ Result<std::unique_ptr<CanBus>> open_socketcan(const std::string& interface, uin
     if (fd < 0) return fail(fmt::format("this kernel has no CAN ({}): modprobe can_raw", std::strerror(errno)));
     sockaddr_can address{};
     address.can_family = AF_CAN;
-    const can_filter only{id, CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    const can_filter only{ids.id, ids.mask | CAN_EFF_FLAG | CAN_RTR_FLAG};
     const bool found = ::ioctl(fd, SIOCGIFINDEX, &request) == 0;
     address.can_ifindex = request.ifr_ifindex;
     if (!found || ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &only, sizeof only) != 0 ||

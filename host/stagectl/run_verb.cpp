@@ -12,6 +12,7 @@
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
+#include "stagectl/stage_watch.hpp"
 #include "stagectl/verbs.hpp"
 #include "take/take.hpp"
 
@@ -29,6 +30,7 @@ struct Options {
     std::vector<std::string> also;  // QUALITY=ARCHIVE
     double fps = 0;
     bool nominal = false, overwrite = false, single_float = false, json = false;
+    std::optional<bool> arm;  // whether to wait for the button; otherwise where there is one
 };
 
 Result<Calibration> open_calibration(const Options& options, const StageConfig& stage) {
@@ -119,13 +121,14 @@ void print_output(const OutputReport& report, const std::string& folder, const O
     if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
 }
 
-void print_report(const TakeReport& report, bool is_estimate, const std::vector<Planned>& planned,
-                  const Options& options) {
+void print_report(const TakeReport& report, bool is_estimate, const std::string& stopped_by,
+                  const std::vector<Planned>& planned, const Options& options) {
     const RecordReport& record = report.record;
     for (size_t n = 0; n < planned.size(); ++n) print_output(report.outputs[n], planned[n].archive.folder(), options);
     if (!options.json)
         fmt::print("{} of {} slots missing; {:.1f} s\n", record.slots_missing, record.slots_total,
                    report.seconds_total);
+    if (!stopped_by.empty()) fmt::print(stderr, "stagectl: {}\n", stopped_by);
     if (!record.camera_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.camera_end);
     if (!record.board_end.empty()) fmt::print(stderr, "stagectl: {}\n", record.board_end);
     if (record.stale_buffers > 0)
@@ -168,6 +171,13 @@ TakeMasks masks_of(const Options& options) {
     masks.fill_from_neighbours = options.fill == "neighbours";
     masks.estimate = *estimate_named(options.estimate);  // one of estimate_names(), as the option was checked
     return masks;
+}
+
+// For report and manifest.
+nlohmann::json watch_account(const StageWatch& watch, const StopRequest& stop) {
+    nlohmann::json json = watch.account();
+    json["stopped_by"] = stop.why();
+    return json;
 }
 
 // A performance where --fps is given, one target a cycle else.
@@ -239,6 +249,13 @@ Result<std::vector<Planned>> plan_outputs(const Options& options, const Sequence
     return planned;
 }
 
+// Of --arm and --no-arm, or else of the stage.
+Result<bool> waits_for_arm(const Options& options, const StageWatch& watch) {
+    if (options.arm.value_or(false) && !watch.has_arm_button())
+        return fail("--arm: the stage has no arm button: add [gpio.arm] to the stage");
+    return options.arm.value_or(watch.has_arm_button());
+}
+
 Result<int> run(const Options& options) {
     auto config = open_sequence(options.sequence);
     if (!config.ok()) return config.error();
@@ -262,9 +279,15 @@ Result<int> run(const Options& options) {
     if (const Status writable = check_account(options); !writable.ok()) return writable.error();
     auto planned = plan_outputs(options, *sequence, *stage, *targets);
     if (!planned.ok()) return planned.error();
+    StopRequest& stop = stop_on_signal();
+    auto watch = StageWatch::open(*stage, stop);
+    if (!watch.ok()) return watch.error();
+    const auto waits = waits_for_arm(options, *watch);
+    if (!waits.ok()) return waits.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
 
+    nlohmann::json watched;  // of the recording
     const TakeDescription take{*sequence, *stage, *calibration, masks_of(options)};
     std::optional<LineFile> account;
     TakeSinks sinks{{},
@@ -272,12 +295,23 @@ Result<int> run(const Options& options) {
                         if (!account) account.emplace(options.frames);
                         add_to_account(*account, frame);
                     },
-                    [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); }};
+                    [](uint64_t decided, uint64_t total) { show_progress("recording", decided, total); },
+                    [&] {
+                        watch->end_take();
+                        return watched = watch_account(*watch, stop);
+                    }};
     for (Planned& one : *planned) sinks.outputs.push_back({one.archive, one.targets});
-    const auto report = run_take(take, {*session->board, {session->camera.get()}}, sinks, stop_on_signal());
-    if (!report.ok()) return report.error();
-    print_report(*report, sequence->basis.is_estimate, *planned, options);
-    if (options.json) print_json(to_json(*report, *planned));
+    if (*waits)
+        if (const Status armed = watch->wait_for_arm(); !armed.ok()) return armed.error();
+    if (const Status ready = watch->begin_take(); !ready.ok()) return ready.error();
+    const auto report = run_take(take, {*session->board, {session->camera.get()}}, sinks, stop.wanted);
+    if (!report.ok()) return because_of(stop, report.error());
+    print_report(*report, sequence->basis.is_estimate, watched["stopped_by"], *planned, options);
+    if (options.json) {
+        nlohmann::json json = to_json(*report, *planned);
+        json.update(watched);
+        print_json(json);
+    }
     // The take is finished first, whatever became of its account.
     if (account)
         if (const Status told = account->finish(); !told.ok()) return told.error();
@@ -307,6 +341,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
         ->check(CLI::Range(1, 1'000'000));
     options->links.add_to(*verb, true);
+    verb->add_flag("--arm,!--no-arm", options->arm,
+                   "wait for the arm button, or not; otherwise where the stage has one ([gpio.arm])");
     verb->add_option("--calibration", options->calibration, "folder of `stagectl calibrate`");
     verb->add_flag("--nominal", options->nominal, "no calibration: black level and gain as the stage states them");
     verb->add_option("-o,--output", options->output, "archive to make (take.rfa)")->required();

@@ -50,8 +50,10 @@ class Output {
                 developed.seconds_motion,  written.error};
     }
 
-    Status finish(const TakeDescription& take, const Board& board, const RecordReport& record) {
+    Status finish(const TakeDescription& take, const Board& board, const RecordReport& record,
+                  const nlohmann::json& account) {
         archive_.add_to_manifest(describe_take(take, targets_, board, record, developer_.missing_json()));
+        archive_.add_to_manifest(account);
         return archive_.finish();
     }
 
@@ -113,12 +115,13 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
     TakeReport report;
     const auto record = record_take(devices.board, *devices.cameras[0], take.sequence, take.stage,
                                     measured_black(take.calibration), sink, stop);
+    const auto account = sinks.account ? sinks.account() : nlohmann::json::object();
     for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);
     report.record = *record;
     for (size_t n = 0; n < outputs.size(); ++n) {
-        const Status finished = outputs[n]->finish(take, devices.board, *record);
+        const Status finished = outputs[n]->finish(take, devices.board, *record, account);
         if (!finished.ok() && report.outputs[n].write_error.empty())
             report.outputs[n].write_error = finished.error().message;
     }

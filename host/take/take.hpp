@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,8 @@ struct TakeSinks {
     std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
     std::function<void(const Frame&)> identified;                    // every frame that has its slot
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
+    std::function<nlohmann::json()>
+        account;  // of what else watched the stage, for the manifest: asked once it is recorded
 };
 
 // Of one archive.
