@@ -161,15 +161,21 @@ BoardRelay::~BoardRelay() {
 }
 
 Status BoardRelay::serve(Board& board) {
-    if (const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK); fd >= 0) {
-        if (client_) {
-            (void)send_reply(fd, {socket_usb_reply_magic, 0, socket_usb_busy, 0});
-            ::close(fd);
-        } else {
-            client_ = std::make_unique<Client>(fd);
-        }
+    if (client_)
+        if (const Status served = serve_client(board); !served.ok()) return served;
+    // After that: one that left makes room for the next.
+    const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) return Done{};
+    if (!client_) {
+        client_ = std::make_unique<Client>(fd);
+        return Done{};
     }
-    if (!client_) return Done{};
+    (void)send_reply(fd, {socket_usb_reply_magic, 0, socket_usb_busy, 0});
+    ::close(fd);
+    return Done{};
+}
+
+Status BoardRelay::serve_client(Board& board) {
     const bool stays = client_->receive();
     ols_frame message;
     if (client_->next_message(message)) {

@@ -27,6 +27,7 @@ class BoardRelay {
   private:
     struct Client;
     BoardRelay(std::string path, int listener);
+    Status serve_client(Board& board);
 
     const std::string path_;
     const int listener_;

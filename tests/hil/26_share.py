@@ -6,6 +6,7 @@ import signal
 import socket
 import struct
 import subprocess
+import threading
 
 import pytest
 
@@ -43,7 +44,17 @@ class Play:
         board.plug_usb().usb.close()  # it is up
         command = [STAGECTL, "play", sequence, "--cycles", 0, "--board", f"socket:{board.path}/board.sock", "--json", *arguments]
         self.process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.triggers = [json.loads(self.process.stdout.readline())]  # it plays
+        self.triggers, self.plays = [], threading.Event()
+        self.reader = threading.Thread(target=self._read)
+        self.reader.start()
+        self.plays.wait()
+
+    def _read(self):
+        for line in self.process.stdout:
+            if line.endswith("\n"):  # not what a killed one had begun
+                self.triggers.append(json.loads(line))
+            self.plays.set()
+        self.plays.set()
 
     def swap(self, sequence, *arguments):
         command = [STAGECTL, "swap", sequence, "--board", f"socket:{self.shared}", *arguments]
@@ -52,9 +63,9 @@ class Play:
     def end(self, with_signal=None):
         if with_signal:
             self.process.send_signal(with_signal)
-        printed, errors = self.process.communicate(timeout=300)
-        self.triggers += [json.loads(line) for line in printed.splitlines()]
-        return self.process.returncode, errors
+        errors = self.process.stderr.read()
+        self.reader.join()
+        return self.process.wait(timeout=300), errors
 
 
 @pytest.fixture
@@ -71,7 +82,7 @@ def play(emulated, tmp_path):
     for one in started:
         if one.process.poll() is None:
             one.process.kill()
-            one.process.communicate()
+            one.end()
 
 
 def test_a_swapped_sequence_follows_without_a_gap_by_the_trace_and_the_log(play, tmp_path):

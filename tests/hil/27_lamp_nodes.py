@@ -4,12 +4,11 @@ import json
 import re
 import struct
 import subprocess
+import threading
 
 import pytest
 
-from ols_board import can
 from ols_board.board import BOARD, ROOT
-from ols_board.program import CHAIN_BITS
 
 STAGECTL = ROOT / "build/host/bin/stagectl"
 FIRST_NODE = 0x200
@@ -43,11 +42,13 @@ def play(folder, board, cycles, more=""):
 def test_nodes_speak_every_second_of_board_time_and_tell_what_was_lit(emulated, tmp_path):
     board = emulated("--lamp-nodes", can=True)
     listener = board.bus()
+    has_played = threading.Event()
+    reader = threading.Thread(target=lambda: [listener.receive() for _ in iter(has_played.is_set, True)])
+    reader.start()
     done = play(tmp_path, board, 450)
+    has_played.set()
+    reader.join()
     assert done.returncode == 0, done.stderr
-    listener.receive()
-    while listener.receive(wait=False):
-        pass
     told = {node: [(tick, *struct.unpack("<hHHBB", data)) for tick, frame_id, data in listener.heard
                    if frame_id == FIRST_NODE + node] for node in range(NODES)}
     for node, frames in told.items():
