@@ -177,20 +177,34 @@ Status Board::receive(Exchange& exchange) {
     return Done{};
 }
 
-Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id, Exchange& exchange) {
+Result<Board::RawReply> Board::wait_for_any_reply(uint16_t request_id, Exchange& exchange) {
     for (;;) {
         ols_frame reply;
         while (ols_frame_parser_read(parser_.get(), &reply)) {
             // A reply to a request that was given up earlier is nobody's any more.
             if (reply.request_id != request_id) continue;
-            const std::span<const uint8_t> content(reply.payload, reply.payload_bytes);
-            if (reply.type == (OLS_ERROR | OLS_REPLY)) return refusal(content);
-            if (reply.type == (type | OLS_REPLY)) return std::vector<uint8_t>(content.begin(), content.end());
-            return says(fmt::format("answered message {:#04x} with one of type {:#04x}: reset it and start over", type,
-                                    uint16_t(reply.type)));
+            return RawReply{reply.type, {reply.payload, reply.payload + reply.payload_bytes}};
         }
         if (const Status more = receive(exchange); !more.ok()) return more.error();
     }
+}
+
+Result<std::vector<uint8_t>> Board::wait_for_reply(uint16_t type, uint16_t request_id, Exchange& exchange) {
+    auto reply = wait_for_any_reply(request_id, exchange);
+    if (!reply.ok()) return reply.error();
+    if (reply->type == (OLS_ERROR | OLS_REPLY)) return refusal(reply->payload);
+    if (reply->type == (type | OLS_REPLY)) return std::move(reply->payload);
+    return says(
+        fmt::format("answered message {:#04x} with one of type {:#04x}: reset it and start over", type, reply->type));
+}
+
+Result<Board::RawReply> Board::pass_on(uint16_t type, std::span<const uint8_t> payload) {
+    Exchange exchange = begin(1);
+    std::vector<uint8_t> bytes;
+    const uint16_t request_id = add_request(type, payload, bytes);
+    if (const Status sent = transfer_->write(bytes, reply_timeout_us, exchange.deadline); !sent.ok())
+        return sent.error();
+    return wait_for_any_reply(request_id, exchange);
 }
 
 Result<std::vector<uint8_t>> Board::request(uint16_t type, std::span<const uint8_t> payload) {

@@ -55,6 +55,13 @@ class Board {
     Result<ols_status_reply> status();
     Status reboot_to_bootloader();  // the board leaves; refused while a program is armed or plays
 
+    // A message of another program's as it is, and the board's reply as it is, a refusal too (board_relay.hpp).
+    struct RawReply {
+        uint16_t type = 0;
+        std::vector<uint8_t> payload;
+    };
+    Result<RawReply> pass_on(uint16_t type, std::span<const uint8_t> payload);
+
     // The log from `first_counter` on. Asks for one message of it, or, when triggers up to `known_counter` are known to have
     // fired, for up to four at once: at 20 000 triggers a second a message fills in 2.4 ms, which a host that waits for each
     // reply may not keep up with.
@@ -78,6 +85,7 @@ class Board {
     // The two halves of that: appends the request to `bytes`, and returns its id; waits for the reply to that id.
     uint16_t add_request(uint16_t type, std::span<const uint8_t> payload, std::vector<uint8_t>& bytes);
     Result<std::vector<uint8_t>> wait_for_reply(uint16_t type, uint16_t request_id, Exchange& exchange);
+    Result<RawReply> wait_for_any_reply(uint16_t request_id, Exchange& exchange);
     Status receive(Exchange& exchange);
     Status command(uint16_t type, std::span<const uint8_t> payload = {});
     template <typename Reply>

@@ -15,6 +15,13 @@
 
 namespace ols {
 
+// Which frames of the standard format are received: those whose identifier is `id` in the bits of `mask`.
+struct CanIds {
+    uint16_t id = 0, mask = CAN_SFF_MASK;
+
+    bool holds(uint32_t can_id) const { return (can_id & (mask | CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) == id; }
+};
+
 class CanBus {
   public:
     virtual ~CanBus() = default;
@@ -32,10 +39,10 @@ class CanBus {
     virtual uint64_t now_us() const = 0;
 };
 
-// A SocketCAN interface, as in `ip link`: "can0". Only frames from the board are received.
-Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place);
+// A SocketCAN interface of this machine. Only `ids` are received.
+Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place, CanIds ids);
 
-// The emulated bus (docs/architecture.md, "CAN frames over a socket").
+// The emulated bus, of which everything is received (docs/architecture.md, "CAN frames over a socket").
 Result<std::unique_ptr<CanBus>> open_can_socket(const std::string& path, const Deadline& deadline);
 
 }  // namespace ols

@@ -56,7 +56,7 @@ Result<std::unique_ptr<Transfer>> open_on_socketcan(const CanPlace& place) {
         if (!opened.ok()) return opened.error();
         transfer = std::move(*opened);
     } else {
-        auto bus = open_socketcan(place);
+        auto bus = open_socketcan(place, {place.to_host()});
         if (!bus.ok()) return bus.error();
         transfer = can_transfer(std::move(*bus), place.board_number);
     }

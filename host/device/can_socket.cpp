@@ -36,6 +36,8 @@ class CanSocket : public CanBus {
 
     Result<std::optional<can_frame>> receive(uint64_t until_us, const Deadline& deadline) override {
         for (;;) {
+            if (deadline.left_ms() > 0 && !socket_.has_bytes_within(deadline.next_wait_ms()))
+                return std::optional<can_frame>();
             auto record = next_record(deadline);
             if (!record.ok() || *record || now_us_ >= until_us) return record;
         }

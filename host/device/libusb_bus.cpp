@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <libusb-1.0/libusb.h>
 
+#include <sys/time.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <optional>
@@ -33,15 +36,18 @@ UsbOutcome outcome_of(int code) {
     }
 }
 
+// udev(7): where rules lie.
+bool has_udev_rule() {
+    for (const char* folder : {"/etc/udev/rules.d", "/run/udev/rules.d", "/usr/local/lib/udev/rules.d",
+                               "/usr/lib/udev/rules.d", "/lib/udev/rules.d"})
+        if (::access((std::string(folder) + "/60-open-light-stage.rules").c_str(), F_OK) == 0) return true;
+    return false;
+}
+
 std::string open_problem(int code, libusb_device* device) {
     const auto where = fmt::format("the USB device at bus {} address {}", libusb_get_bus_number(device),
                                    libusb_get_device_address(device));
-    if (code == LIBUSB_ERROR_ACCESS)
-        return fmt::format(
-            "no permission for {}: install the udev rule 60-open-light-stage.rules (`sudo make install`, or copy it "
-            "from "
-            "host/device/ to /etc/udev/rules.d/ and run `sudo udevadm control --reload`), then plug the board in again",
-            where);
+    if (code == LIBUSB_ERROR_ACCESS) return usb_permission_text(where, has_udev_rule());
     if (code == LIBUSB_ERROR_BUSY) return fmt::format("{} is used by another program: end that one first", where);
     return fmt::format("cannot open {}: {}; plug it in again", where, libusb_strerror(libusb_error(code)));
 }
@@ -107,7 +113,23 @@ class LibusbDevice : public UsbDevice {
     UsbResult bulk(uint8_t endpoint, uint8_t* bytes, size_t count, uint32_t timeout_ms) {
         int done = 0;
         const int code = libusb_bulk_transfer(handle_.get(), endpoint, bytes, int(count), &done, timeout_ms);
+        if (outcome_of(code) == UsbOutcome::failed && has_gone()) return {UsbOutcome::gone, size_t(done)};
         return {outcome_of(code), size_t(done)};
+    }
+
+    // A transfer that a pulled cable cuts may fail before the kernel knows that the device has gone. GET_STATUS (USB 2.0 9.4.5)
+    // is answered by every device that is there.
+    bool has_gone() {
+        constexpr int looks = 10, look_ms = 50;
+        for (int n = 0; n < looks; ++n) {
+            uint8_t status[2];
+            const int code = libusb_control_transfer(handle_.get(), LIBUSB_ENDPOINT_IN, LIBUSB_REQUEST_GET_STATUS, 0, 0,
+                                                     status, sizeof status, look_ms);
+            if (code == LIBUSB_ERROR_NO_DEVICE) return true;
+            if (code >= 0) return false;
+            std::this_thread::sleep_for(std::chrono::milliseconds(look_ms));
+        }
+        return false;
     }
 
     Context context_;  // outlives the handle
@@ -118,6 +140,9 @@ class LibusbDevice : public UsbDevice {
 class LibusbBus : public UsbBus {
   public:
     explicit LibusbBus(Context context) : context_(std::move(context)) {}
+    ~LibusbBus() override {
+        if (callback_) libusb_hotplug_deregister_callback(context_.get(), *callback_);
+    }
 
     Result<std::vector<UsbListing>> list(uint16_t vendor, uint16_t product) override {
         const auto devices = find(vendor, product);
@@ -138,7 +163,39 @@ class LibusbBus : public UsbBus {
 
     void pause_ms(uint32_t ms) override { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
 
+    void wait_for_change(uint32_t ms_at_most) override {
+        if (!listen_for_changes()) return pause_ms(ms_at_most);
+        const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(ms_at_most);
+        for (changed_ = 0; !changed_;) {
+            const auto left =
+                std::chrono::ceil<std::chrono::microseconds>(end - std::chrono::steady_clock::now()).count();
+            if (left <= 0) return;
+            timeval piece{time_t(left / 1'000'000), suseconds_t(left % 1'000'000)};
+            if (libusb_handle_events_timeout_completed(context_.get(), &piece, &changed_) != LIBUSB_SUCCESS)
+                return pause_ms(uint32_t(left / 1000 + 1));
+        }
+    }
+
   private:
+    bool listen_for_changes() {
+        if (callback_) return true;
+        if (!libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG)) return false;
+        const auto events =
+            libusb_hotplug_event(LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT);
+        constexpr int any = LIBUSB_HOTPLUG_MATCH_ANY;
+        libusb_hotplug_callback_handle handle;
+        if (libusb_hotplug_register_callback(context_.get(), events, libusb_hotplug_flag(0), any, any, any, on_change,
+                                             this, &handle) != LIBUSB_SUCCESS)
+            return false;
+        callback_ = handle;
+        return true;
+    }
+
+    static int LIBUSB_CALL on_change(libusb_context*, libusb_device*, libusb_hotplug_event, void* bus) {
+        static_cast<LibusbBus*>(bus)->changed_ = 1;
+        return 0;  // go on listening
+    }
+
     Result<std::vector<Device>> find(uint16_t vendor, uint16_t product) {
         libusb_device** all = nullptr;
         const ssize_t count = libusb_get_device_list(context_.get(), &all);
@@ -182,6 +239,8 @@ class LibusbBus : public UsbBus {
     }
 
     Context context_;
+    std::optional<libusb_hotplug_callback_handle> callback_;
+    int changed_ = 0;
 };
 
 }  // namespace

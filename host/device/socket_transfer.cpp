@@ -4,34 +4,13 @@
 
 #include <algorithm>
 
+#include "device/socket_usb.hpp"
 #include "device/transfer.hpp"
 #include "device/unix_socket.hpp"
 
 namespace ols {
 
 namespace {
-
-constexpr uint32_t request_magic = 0x54425355;  // "USBT", little-endian
-constexpr uint32_t reply_magic = 0x52425355;    // "USBR"
-constexpr uint8_t type_bulk = 1;
-constexpr int32_t status_busy = -6;  // to no transfer: the client is turned away
-constexpr uint8_t endpoint_out = 0x01, endpoint_in = 0x82;
-
-#pragma pack(push, 1)
-struct TransferRequest {
-    uint32_t magic = request_magic, tag = 0;
-    uint8_t type = type_bulk, endpoint = 0;
-    uint16_t reserved = 0;
-    uint32_t length = 0, timeout_us = 0;
-    uint8_t setup[8] = {};
-};
-struct TransferReply {
-    uint32_t magic, tag;
-    int32_t status;
-    uint32_t length;
-};
-#pragma pack(pop)
-static_assert(sizeof(TransferRequest) == 28 && sizeof(TransferReply) == 16);
 
 // What the board did, behind its name, and what to do.
 std::string status_text(int32_t status) {
@@ -41,7 +20,7 @@ std::string status_text(int32_t status) {
         case -3: return "did not answer in time: reset it and start over";
         case -4: return "cancelled the transfer: start over";
         case -5: return "sent more than was asked for (overflow): reset it and start over";
-        case status_busy:
+        case socket_usb_busy:
             return "is busy: another program has it, and it serves one at a time; wait until that one has finished, or "
                    "end it";
         default: return fmt::format("failed the transfer with the unknown status {}: start the stage again", status);
@@ -55,7 +34,7 @@ class SocketTransfer : public Transfer {
     std::string name() const override { return socket_.name(); }
 
     Status write(std::span<const uint8_t> bytes, uint32_t timeout_us, const Deadline& deadline) override {
-        if (const Status sent = request(endpoint_out, bytes.size(), timeout_us, deadline); !sent.ok()) return sent;
+        if (const Status sent = request(socket_usb_out, bytes.size(), timeout_us, deadline); !sent.ok()) return sent;
         if (const Status sent = send(bytes.data(), bytes.size(), deadline); !sent.ok()) return sent;
         const auto reply = receive_reply(0, deadline);
         if (!reply.ok()) return reply.error();
@@ -65,7 +44,7 @@ class SocketTransfer : public Transfer {
     // An empty packet ends a message whose last packet was full; it is not what the caller waits for.
     Result<std::vector<uint8_t>> read(size_t capacity, uint32_t timeout_us, const Deadline& deadline) override {
         for (int empty_packets = 0; empty_packets < empty_packets_max; ++empty_packets) {
-            if (const Status sent = request(endpoint_in, capacity, timeout_us, deadline); !sent.ok())
+            if (const Status sent = request(socket_usb_in, capacity, timeout_us, deadline); !sent.ok())
                 return sent.error();
             auto payload = receive_reply(capacity, deadline);
             if (!payload.ok() || !payload->empty()) return payload;
@@ -78,7 +57,7 @@ class SocketTransfer : public Transfer {
     static constexpr int late_replies_max = 16;  // to transfers given up earlier; a client has a few under way at most
 
     Status request(uint8_t endpoint, size_t length, uint32_t timeout_us, const Deadline& deadline) {
-        TransferRequest request;
+        SocketUsbRequest request;
         request.tag = ++tag_;
         request.endpoint = endpoint;
         request.length = uint32_t(length);
@@ -96,7 +75,7 @@ class SocketTransfer : public Transfer {
     // The payload of the reply to the last request; replies to transfers given up earlier are passed over.
     Result<std::vector<uint8_t>> receive_reply(size_t capacity, const Deadline& deadline) {
         for (int late = 0; late <= late_replies_max; ++late) {
-            TransferReply reply;
+            SocketUsbReply reply;
             if (const Status got = socket_.receive(&reply, sizeof reply, deadline); !got.ok()) return got.error();
             if (const Status sound = check(reply, capacity); !sound.ok()) return sound.error();
             std::vector<uint8_t> payload(reply.length);
@@ -110,10 +89,10 @@ class SocketTransfer : public Transfer {
     }
 
     // Nothing is taken from a reply, memory for it neither, before its head is known to be sound.
-    Status check(const TransferReply& reply, size_t capacity) const {
-        if (reply.magic != reply_magic)
+    Status check(const SocketUsbReply& reply, size_t capacity) const {
+        if (reply.magic != socket_usb_reply_magic)
             return fail(name() + " does not speak USB transfers: is it the board's socket?");
-        if (reply.status == status_busy) return fail(name() + " " + status_text(reply.status));
+        if (reply.status == socket_usb_busy) return fail(name() + " " + status_text(reply.status));
         if (reply.tag == 0 || reply.tag > tag_)
             return fail(fmt::format("{} answers transfer {}, which it was not asked for: start the stage again", name(),
                                     reply.tag));

@@ -68,11 +68,11 @@ class SocketCan : public CanBus {
 
 }  // namespace
 
-Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place) {
+Result<std::unique_ptr<CanBus>> open_socketcan(const CanPlace& place, CanIds ids) {
     const auto opened = open_can_address(place, SOCK_RAW, CAN_RAW);
     if (!opened.ok()) return opened.error();
     auto bus = std::make_unique<SocketCan>(opened->fd, place);
-    const can_filter only{place.to_host(), CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG};
+    const can_filter only{ids.id, ids.mask | CAN_EFF_FLAG | CAN_RTR_FLAG};
     if (::setsockopt(opened->fd, SOL_CAN_RAW, CAN_RAW_FILTER, &only, sizeof only) != 0 ||
         ::bind(opened->fd, reinterpret_cast<const sockaddr*>(&opened->address), sizeof opened->address) != 0)
         return can_down(place, errno);

@@ -82,6 +82,11 @@ bool UnixSocket::has_bytes() const {
     return ::recv(fd_, &byte, 1, MSG_PEEK | MSG_DONTWAIT) > 0;
 }
 
+bool UnixSocket::has_bytes_within(int timeout_ms) const {
+    pollfd ready{fd_, POLLIN, 0};
+    return ::poll(&ready, 1, timeout_ms) != 0;
+}
+
 Error UnixSocket::too_slow(const Deadline& deadline) const {
     return fail(fmt::format(
         "{} has not finished an exchange {}: is it stopped, or does something hold it back? Otherwise start "

@@ -22,6 +22,9 @@ class UnixSocket {
     // Whether bytes wait to be received, also from another end that has gone.
     bool has_bytes() const;
 
+    // Whether receive() has something to do within so long: bytes, or another end that has gone.
+    bool has_bytes_within(int timeout_ms) const;
+
     const std::string& name() const { return name_; }  // "the board at 'PATH'"
 
     UnixSocket(UnixSocket&& other) noexcept;

@@ -53,9 +53,15 @@ class UsbBus {
 
     // Waits for devices to come and go.
     virtual void pause_ms(uint32_t ms) = 0;
+
+    // The same, and returns at once when a device has come or gone, where the system tells of that.
+    virtual void wait_for_change(uint32_t ms_at_most) { pause_ms(ms_at_most); }
 };
 
-// The machine's own USB, by libusb.
+// What to do about a device `where` that may not be opened; `has_rule`: the udev rule is installed.
+std::string usb_permission_text(const std::string& where, bool has_rule);
+
+// The machine's own USB, by libusb. It sees devices that come later only where udev runs; a bus that is opened anew sees all.
 Result<std::unique_ptr<UsbBus>> open_usb_bus();
 
 }  // namespace ols

@@ -73,7 +73,7 @@ Result<int> run(const Options& options) {
     if (!writable.ok()) return writable.error();
 
     const auto place =
-        find_place(**frames, *sequence, stage->cameras[0], measured_black(*calibration, 0), stop_on_signal());
+        find_place(**frames, *sequence, stage->cameras[0], measured_black(*calibration, 0), stop_on_signal().wanted);
     if (!place.ok()) return place.error();
     say_place((*frames)->facts(), *place, *sequence);
     sequence->config.cycles = int(place->cycles);
@@ -87,7 +87,7 @@ Result<int> run(const Options& options) {
     take.witnesses = {(*frames)->facts().has_times ? "camera number and time" : "file number", "optical code"};
     std::optional<LineFile> account;
     const TakeSinks sinks = sinks_of(*planned, options.take, account, "ingesting");
-    const auto report = ingest_take(take, **frames, *place, sinks, stop_on_signal());
+    const auto report = ingest_take(take, **frames, *place, sinks, stop_on_signal().wanted);
     if (!report.ok()) return report.error();
     return finish_take(*report, sequence->basis.is_estimate, *planned, options.take, account,
                        origin_of(**frames, *place, *sequence));

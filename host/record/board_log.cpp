@@ -47,12 +47,13 @@ PlayBounds::PlayBounds(const Sequence& sequence) {
 
 BoardLog::BoardLog(Board& board, const PlayBounds& bounds, std::function<std::vector<uint64_t>()> arrivals,
                    std::function<Reason()> why_stop, std::function<void(LogNews)> on_news,
-                   std::function<void(LogEnd)> on_end)
+                   std::function<void(LogEnd)> on_end, std::function<Status()> between)
     : board_(board),
       bounds_(bounds),
       arrivals_(std::move(arrivals)),
       why_stop_(std::move(why_stop)),
-      on_news_(std::move(on_news)) {
+      on_news_(std::move(on_news)),
+      between_(std::move(between)) {
     thread_ = std::thread([this, on_end = std::move(on_end)] { on_end(follow()); });
 }
 
@@ -91,6 +92,8 @@ LogEnd BoardLog::read_to_end() {
             // A board that has finished or failed meanwhile refuses, which its status then explains.
             (void)board_.stop();
         }
+        if (between_)
+            if (const Status done = between_(); !done.ok()) return lost(done.error().message);
         std::vector<uint64_t> arrivals = arrivals_();
         auto log = reader.read_on();
         if (!log.ok()) return lost(log.error().message);

@@ -33,6 +33,7 @@ struct PlayBounds {
     uint64_t ticks = UINT64_MAX;  // from its start
 
     explicit PlayBounds(const Sequence& sequence);
+    PlayBounds() = default;  // of a play that others may change
 };
 
 class BoardLog {
@@ -40,10 +41,11 @@ class BoardLog {
     // Starts to follow; all functions are called from the thread. `arrivals` counts the frames read from each camera.
     // on_end comes once, last.
     // When `why_stop` says something the board is told to stop, and what it fired until then is still read; LogEnd says it.
+    // `between` may use the board, before each look at its log; its error means that the board is heard no more.
     // A board that is heard no more, or whose log or clock does not go on as it must, is told to stop and given up.
     BoardLog(Board& board, const PlayBounds& bounds, std::function<std::vector<uint64_t>()> arrivals,
-             std::function<Reason()> why_stop, std::function<void(LogNews)> on_news,
-             std::function<void(LogEnd)> on_end);
+             std::function<Reason()> why_stop, std::function<void(LogNews)> on_news, std::function<void(LogEnd)> on_end,
+             std::function<Status()> between = {});
     ~BoardLog();  // waits for the end
 
     // This machine's steady clock beside the board's, by what was asked of the board. After the end.
@@ -60,6 +62,7 @@ class BoardLog {
     std::function<Reason()> why_stop_;
     std::function<void(LogNews)> on_news_;
     HostClock host_clock_;
+    std::function<Status()> between_;
     uint64_t last_tick_ = 0;  // that the board told
     std::optional<Deadline> next_tick_;
     std::thread thread_;

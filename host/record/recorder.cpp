@@ -129,22 +129,22 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
 }
 
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const std::atomic<bool>& stop) {
+                                 const StageConfig& stage, const StopRequest& stop) {
     for (const RecordedCamera& recorded : cameras)
         if (const Status status = recorded.camera.set_up(stage.cameras[recorded.index]); !status.ok())
             return status.error();
     std::deque<CameraTake> takes;
     for (const RecordedCamera& recorded : cameras) {
-        takes.emplace_back(recorded, takes.size(), sequence, stop);
+        takes.emplace_back(recorded, takes.size(), sequence, stop.wanted);
         if (!takes.back().time_ns().ok()) return takes.back().time_ns().error();
     }
-    if (stop) return fail("stopped before the take began");
+    if (stop.wanted) return fail("stopped before the take began");
     if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
 
     for (size_t i = 0; i < cameras.size(); ++i) takes[i].begin(stage.cameras[cameras[i].index]);
     // With no camera left nobody would see what the board plays.
     const auto why_stop = [&]() -> Reason {
-        if (stop) return {Cause::stopped, "the take was stopped"};
+        if (Reason asked = stop.reason(); !asked.empty()) return asked;
         std::string why;
         for (const CameraTake& take : takes) {
             const CameraState state = take.state();

@@ -12,6 +12,7 @@
 #include "device/camera.hpp"
 #include "record/clock_fit.hpp"
 #include "record/identify.hpp"
+#include "record/stop_request.hpp"
 #include "stage/sequence.hpp"
 #include "stage/stage.hpp"
 
@@ -79,6 +80,6 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
 // Errors: a camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that
 // fails later is no error here: what was proved stands, the rest is missing and says why.
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const std::atomic<bool>& stop);
+                                 const StageConfig& stage, const StopRequest& stop);
 
 }  // namespace ols

@@ -167,6 +167,8 @@ Result<StageConfig> read_stage(const std::string& path) {
     read_lamps(file->section("lamps"), stage);
     read_chain(file->section("chain"), stage);
     file->section("board").read("link", stage.board);
+    stage.gpio = read_gpio(file->section("gpio"));
+    if (file->has("telemetry")) stage.telemetry = read_telemetry(file->section("telemetry"), stage.chain_bits);
     file->read("calibration", stage.calibration_dir);
     if (!stage.calibration_dir.empty()) stage.calibration_dir = file->resolve_path(stage.calibration_dir);
     if (file->has("camera")) {

@@ -9,8 +9,10 @@
 #include "image/frame.hpp"
 #include "result.hpp"
 #include "stage/camera_setup.hpp"
+#include "stage/gpio_setup.hpp"
 #include "stage/lamp_response.hpp"
 #include "stage/lamps.hpp"
+#include "stage/telemetry_setup.hpp"
 
 namespace ols {
 
@@ -44,6 +46,8 @@ struct StageConfig {
     std::vector<int> chain_bit_of_lamp;  // sphere lamps first, then matte lamps; none without a chain
     std::string board = "";              // "socket:PATH"
     std::vector<CameraConfig> cameras;
+    GpioSetup gpio;
+    TelemetrySetup telemetry;
     std::string calibration_dir = "";  // "" = none yet
 
     int lamp_count() const { return int(lamps.size() + matte_lamps_m.size()); }

@@ -6,6 +6,7 @@
 
 #include "program.hpp"
 #include "stagectl/session.hpp"
+#include "stagectl/stage_watch.hpp"
 #include "stagectl/verbs.hpp"
 #include "take/card.hpp"
 
@@ -23,10 +24,15 @@ struct Options {
 Result<int> run(const Options& options) {
     auto session = open_session(options.links, options.card.camera);
     if (!session.ok()) return session.error();
+    StopRequest& stop = stop_on_signal();
+    auto watch = StageWatch::open(session->stage, stop);
+    if (!watch.ok()) return watch.error();
+    if (const Status ready = watch->begin_take(); !ready.ok()) return ready.error();
     const auto card =
-        calibrate_with_card(*session->board, *session->cameras[0], session->stage, options.card, stop_on_signal(),
+        calibrate_with_card(*session->board, *session->cameras[0], session->stage, options.card, stop,
                             [](uint64_t decided, uint64_t total) { show_progress("calibrating", decided, total); });
-    if (!card.ok()) return card.error();
+    watch->end_take();
+    if (!card.ok()) return because_of(stop, card.error());
     if (Status s = write_calibration(options.output, options.card.camera, card->calibration, card->record); !s.ok())
         return s.error();
     if (options.json) {

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
     int exit_code = 0;
     ols::add_run_verb(app, exit_code);
     ols::add_play_verb(app, exit_code);
+    ols::add_swap_verb(app, exit_code);
     ols::add_status_verb(app, exit_code);
     ols::add_sequence_verb(app, exit_code);
     ols::add_basis_verb(app, exit_code);

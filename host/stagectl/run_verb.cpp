@@ -5,6 +5,7 @@
 #include "image/outputs.hpp"
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/session.hpp"
+#include "stagectl/stage_watch.hpp"
 #include "stagectl/take_options.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -16,6 +17,7 @@ struct Options {
     LinkOptions links;
     TakeOptions take;
     int cycles = 0;
+    std::optional<bool> arm;  // whether to wait for the button; otherwise where there is one
 };
 
 // The account of identified frames, a JSON line each. It is opened with the first of them, so that a start that fails leaves an
@@ -24,6 +26,13 @@ Status check_account(const Options& options) {
     return check_outputs({.inputs = {options.take.sequence.path, options.take.sequence.basis, options.links.stage_path,
                                      options.take.calibration},
                           .streams = {options.take.frames}});
+}
+
+// Of --arm and --no-arm, or else of the stage.
+Result<bool> waits_for_arm(const Options& options, const StageWatch& watch) {
+    if (options.arm.value_or(false) && !watch.has_arm_button())
+        return fail("--arm: the stage has no arm button: add [gpio.arm] to the stage");
+    return options.arm.value_or(watch.has_arm_button());
 }
 
 Result<int> run(const Options& options) {
@@ -48,17 +57,30 @@ Result<int> run(const Options& options) {
     if (const Status writable = check_account(options); !writable.ok()) return writable.error();
     auto planned = plan_archives(options.take, *sequence, *stage, *targets);
     if (!planned.ok()) return planned.error();
+    StopRequest& stop = stop_on_signal();
+    auto watch = StageWatch::open(*stage, stop);
+    if (!watch.ok()) return watch.error();
+    const auto waits = waits_for_arm(options, *watch);
+    if (!waits.ok()) return waits.error();
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
 
     const TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
     std::optional<LineFile> account;
-    const TakeSinks sinks = sinks_of(*planned, options.take, account, "recording");
+    nlohmann::json watched;  // of the recording
+    TakeSinks sinks = sinks_of(*planned, options.take, account, "recording");
+    sinks.account = [&] {
+        watch->end_take();
+        return watched = watch->account();
+    };
     std::vector<Camera*> cameras;
     for (const auto& camera : session->cameras) cameras.push_back(camera.get());
-    const auto report = run_take(take, {*session->board, cameras}, sinks, stop_on_signal());
-    if (!report.ok()) return report.error();
-    return finish_take(*report, sequence->basis.is_estimate, *planned, options.take, account);
+    if (*waits)
+        if (const Status armed = watch->wait_for_arm(); !armed.ok()) return armed.error();
+    if (const Status ready = watch->begin_take(); !ready.ok()) return ready.error();
+    const auto report = run_take(take, {*session->board, cameras}, sinks, stop);
+    if (!report.ok()) return because_of(stop, report.error());
+    return finish_take(*report, sequence->basis.is_estimate, *planned, options.take, account, watched);
 }
 
 }  // namespace
@@ -80,6 +102,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(1, 1'000'000));
     options->links.add_to(*verb, true);
     options->take.add_to(*verb);
+    verb->add_flag("--arm,!--no-arm", options->arm,
+                   "wait for the arm button, or not; otherwise where the stage has one ([gpio.arm])");
     verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
 }
 

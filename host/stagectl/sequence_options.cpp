@@ -31,4 +31,11 @@ Result<SequenceConfig> open_sequence(const SequenceOptions& options) {
     return config;
 }
 
+Result<Sequence> open_compiled(const SequenceOptions& options, int cycles, const StageConfig& stage) {
+    auto config = open_sequence(options);
+    if (!config.ok()) return config.error();
+    if (cycles >= 0) config->cycles = cycles;
+    return compile_sequence(*config, stage);
+}
+
 }  // namespace ols

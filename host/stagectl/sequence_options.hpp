@@ -21,4 +21,7 @@ struct SequenceOptions {
 // basis; those of read_sequence and check_basis_name.
 Result<SequenceConfig> open_sequence(const SequenceOptions& options);
 
+// Compiled for the stage, with `cycles` of its own unless they are -1.
+Result<Sequence> open_compiled(const SequenceOptions& options, int cycles, const StageConfig& stage);
+
 }  // namespace ols

@@ -7,29 +7,51 @@
 
 #include <chrono>
 #include <csignal>
+#include <optional>
 #include <thread>
+
+#include "device/usb_device.hpp"
 
 namespace ols {
 
 namespace {
 
-std::atomic<bool> stop_requested = false;
-static_assert(std::atomic<bool>::is_always_lock_free, "set in a signal handler");
+StopRequest stop_request;
 
 void request_stop(int signal_number) {
-    stop_requested = true;
+    stop_request.wanted = true;
     std::signal(signal_number, SIG_DFL);
 }
 
-// What `open` gives, tried again while it fails and the wait is not over.
+constexpr uint32_t retry_ms = 100;
+
+// Between two tries. A board that is plugged in ends it at once where the system tells of it; elsewhere it is found by the next try.
+class RetryPause {
+  public:
+    explicit RetryPause(const std::string& board_link) {
+        if (!board_link.starts_with("usb:")) return;
+        if (auto bus = open_usb_bus(); bus.ok()) usb_ = std::move(*bus);
+    }
+    void wait() {
+        if (usb_) return usb_->wait_for_change(retry_ms);
+        std::this_thread::sleep_for(std::chrono::milliseconds(retry_ms));
+    }
+
+  private:
+    std::unique_ptr<UsbBus> usb_;
+};
+
+// What `open` gives, tried again while it fails, the wait is not over and the user does not stop it.
 template <typename Open>
-auto open_within(double wait_s, Open open) {
+auto open_within(double wait_s, const std::string& board_link, Open open) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
     auto opened = open();
     if (!opened.ok() && wait_s > 0)
         fmt::print(stderr, "stagectl: {}: waiting, {:g} s at most\n", opened.error().message, wait_s);
-    while (!opened.ok() && std::chrono::steady_clock::now() < deadline) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::optional<RetryPause> pause;
+    while (!opened.ok() && !stop_request.wanted && std::chrono::steady_clock::now() < deadline) {
+        if (!pause) pause.emplace(board_link);
+        pause->wait();
         opened = open();
     }
     return opened;
@@ -40,7 +62,7 @@ std::string board_link(const LinkOptions& options, const StageConfig& stage) {
 }
 
 Result<Board> connect_board(const std::string& link, const LinkOptions& options) {
-    Patience patience(int(options.patience_s * 1e3), &stop_requested);
+    Patience patience(int(options.patience_s * 1e3), &stop_request.wanted);
     auto transfer = open_transfer(link, patience.begin_exchange());
     if (!transfer.ok()) return transfer.error();
     return Board::connect(std::move(*transfer), patience);
@@ -90,7 +112,8 @@ void LinkOptions::add_to(CLI::App& verb, bool with_camera) {
                         "otherwise stage.toml's camera sources")
             ->allow_extra_args(false);
     verb.add_option("--wait", wait_s,
-                    "seconds to wait for what is not there yet, as a virtual stage that still renders")
+                    "seconds to wait for what is not there yet, as a board to be plugged in or a virtual stage that "
+                    "still renders")
         ->check(CLI::NonNegativeNumber);
     verb.add_option("--patience", patience_s,
                     "seconds of the wall's clock that the board may take for one answer before it is given up")
@@ -106,7 +129,7 @@ Result<StageConfig> open_stage(const LinkOptions& options) {
 Result<Board> open_board(const LinkOptions& options, const StageConfig& stage) {
     const std::string link = board_link(options, stage);
     if (link.empty()) return which_board();
-    return open_within(options.wait_s, [&] { return connect_board(link, options); });
+    return open_within(options.wait_s, link, [&] { return connect_board(link, options); });
 }
 
 Result<StageSession> open_session(const LinkOptions& options, std::optional<uint32_t> only) {
@@ -117,7 +140,7 @@ Result<StageSession> open_session(const LinkOptions& options, std::optional<uint
     const std::string link = board_link(options, *stage);
     if (link.empty()) return which_board();
     // All anew at each try: a ring that an earlier virtual stage left behind is not the one that comes with the board.
-    return open_within(options.wait_s, [&]() -> Result<StageSession> {
+    return open_within(options.wait_s, link, [&]() -> Result<StageSession> {
         StageSession session{*stage, nullptr, {}};
         for (const auto& [index, source] : *sources) {
             auto camera = open_camera(source, index);
@@ -131,10 +154,15 @@ Result<StageSession> open_session(const LinkOptions& options, std::optional<uint
     });
 }
 
-const std::atomic<bool>& stop_on_signal() {
+StopRequest& stop_on_signal() {
     std::signal(SIGINT, request_stop);
     std::signal(SIGTERM, request_stop);
-    return stop_requested;
+    return stop_request;
+}
+
+Error because_of(const StopRequest& stop, const Error& error) {
+    const std::string why = stop.why();
+    return why.empty() ? error : fail(error.message + ": " + why);
 }
 
 void show_progress(const char* label, uint64_t done, uint64_t total) {

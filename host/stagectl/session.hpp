@@ -11,6 +11,7 @@
 
 #include "device/board.hpp"
 #include "device/camera.hpp"
+#include "record/stop_request.hpp"
 #include "stage/stage.hpp"
 
 namespace ols {
@@ -39,9 +40,12 @@ Result<Board> open_board(const LinkOptions& options, const StageConfig& stage);
 // Opens the stage's cameras, or only the one of a number.
 Result<StageSession> open_session(const LinkOptions& options, std::optional<uint32_t> only = {});
 
-// Turns true at the first SIGINT or SIGTERM, which also ends every wait for the board within Patience::stop_ms; the second ends
-// the program at once.
-const std::atomic<bool>& stop_on_signal();
+// Is asked at the first SIGINT or SIGTERM, which also ends every wait for the board within Patience::stop_ms, as any other reason to
+// stop does; the second signal ends the program at once.
+StopRequest& stop_on_signal();
+
+// The error with the reason for a stop, where there was one.
+Error because_of(const StopRequest& stop, const Error& error);
 
 // Draws "label 42 %" on a terminal, nothing elsewhere; ends the line at the last.
 void show_progress(const char* label, uint64_t done, uint64_t total);

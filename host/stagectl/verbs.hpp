@@ -18,6 +18,7 @@ void add_basis_report_verb(CLI::App& basis, int& exit_code);
 void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_grey_verb(CLI::App& app, int& exit_code);
 void add_ingest_verb(CLI::App& app, int& exit_code);
+void add_swap_verb(CLI::App& app, int& exit_code);
 void add_flash_verb(CLI::App& app, int& exit_code);
 
 }  // namespace ols

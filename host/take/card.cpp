@@ -126,7 +126,7 @@ Status check_card(const Average& card, const Image& above_black, double range, d
 }  // namespace
 
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
-                                            const CardOptions& options, const std::atomic<bool>& stop,
+                                            const CardOptions& options, const StopRequest& stop,
                                             const std::function<void(uint64_t, uint64_t)>& progress) {
     const CameraConfig& config = stage.cameras[options.camera];
     const Sequence sequence = card_sequence(stage, options);

@@ -30,7 +30,7 @@ struct CardCalibration {
 // Errors: a saturated sample, a card darker than a tenth of the range, a view that the card does not fill, missing
 // frames of a kind.
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
-                                            const CardOptions& options, const std::atomic<bool>& stop,
+                                            const CardOptions& options, const StopRequest& stop,
                                             const std::function<void(uint64_t, uint64_t)>& progress);
 
 }  // namespace ols

@@ -71,10 +71,12 @@ class Output {
         return report;
     }
 
-    Status finish(const TakeDescription& take, const nlohmann::json& origin, const RecordReport& record) {
+    Status finish(const TakeDescription& take, const nlohmann::json& origin, const RecordReport& record,
+                  const nlohmann::json& account) {
         std::vector<nlohmann::json> missing;
         for (const CameraDeveloper& developer : developers_) missing.push_back(developer.missing_json());
         archive_.add_to_manifest(describe_take(take, targets_, origin, record, missing));
+        archive_.add_to_manifest(account);
         return archive_.finish();
     }
 
@@ -169,12 +171,13 @@ Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::jso
     }
     TakeReport report;
     const Result<RecordReport> record = record_into(camera_sinks);
+    const auto account = sinks.account ? sinks.account() : nlohmann::json::object();
     for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);
     report.record = *record;
     for (size_t n = 0; n < outputs.size(); ++n) {
-        const Status finished = outputs[n]->finish(take, origin, *record);
+        const Status finished = outputs[n]->finish(take, origin, *record, account);
         if (!finished.ok() && report.outputs[n].write_error.empty())
             report.outputs[n].write_error = finished.error().message;
     }
@@ -185,7 +188,7 @@ Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::jso
 }  // namespace
 
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
-                            const std::atomic<bool>& stop) {
+                            const StopRequest& stop) {
     const size_t cameras = devices.cameras.size();
     if (cameras == 0 || cameras != take.stage.cameras.size())
         return fail(

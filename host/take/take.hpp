@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,8 @@ struct TakeSinks {
     std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
     std::function<void(const Frame&)> identified;                    // every frame that has its slot; one at a time
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
+    std::function<nlohmann::json()>
+        account;  // of what else watched the stage, for the manifest: asked once it is recorded
 };
 
 // Of one archive.
@@ -85,7 +88,7 @@ struct TakeReport {
 // Errors: the stage's cameras were not all given; a camera or the board cannot be started; not one frame came. Then there
 // is no archive. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
-                            const std::atomic<bool>& stop);
+                            const StopRequest& stop);
 
 // Develops a recording that lies in files in the same way; `take` has as many cycles as `place` (record/file_recording.hpp), and one
 // camera. Errors: not one frame has its slot. Then there is no archive.

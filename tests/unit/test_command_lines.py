@@ -15,7 +15,7 @@ BIN = ROOT / "build/host/bin"
 SCENE = ROOT / "tools/stagesim/scenes/card.toml"
 PROGRAMS = ("stagectl", "rf", "stagesim")
 # What a board or a camera must answer; tests/capture and tests/hil run these with --json.
-NEEDS_A_STAGE = {("stagectl", verb) for verb in ("run", "play", "status", "calibrate", "flash")} | {("stagesim", "run")}
+NEEDS_A_STAGE = {("stagectl", verb) for verb in ("run", "play", "swap", "status", "calibrate", "flash")} | {("stagesim", "run")}
 
 
 def run(*command, **options):

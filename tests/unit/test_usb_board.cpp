@@ -57,6 +57,18 @@ TEST_F(UsbBoards, one_that_may_not_be_opened_is_reported_with_what_to_do) {
     EXPECT_EQ(problem(), "no permission: install the udev rule");
 }
 
+TEST(UsbPermission, names_the_rule_with_the_command_that_installs_it_or_the_group_that_it_gives_to) {
+    const std::string without = usb_permission_text("the USB device at bus 1 address 7", false);
+    EXPECT_NE(without.find("bus 1 address 7"), std::string::npos);
+    EXPECT_NE(
+        without.find("sudo install -m 644 host/device/60-open-light-stage.rules /etc/udev/rules.d/ && sudo udevadm "
+                     "control --reload"),
+        std::string::npos);
+    const std::string with = usb_permission_text("the USB device at bus 1 address 7", true);
+    EXPECT_NE(with.find("60-open-light-stage.rules is installed"), std::string::npos);
+    EXPECT_NE(with.find("sudo usermod -aG plugdev"), std::string::npos);
+}
+
 TEST_F(UsbBoards, a_serial_number_that_is_not_there_is_answered_with_those_that_are) {
     bus_.boards = {&board_};
     EXPECT_NE(problem("ffff").find("no board usb:ffff; plugged in: usb:00f1e2d3c4b5a697"), std::string::npos);

@@ -23,7 +23,7 @@ struct RunOptions {
     InputOptions inputs;
     std::string work, image, vcd, pace = "virtual", faults, camera_model = "on", board_program;
     std::vector<std::string> board_faults;
-    bool once = false, no_board = false, keep_frames = false, json = false;
+    bool once = false, no_board = false, can = false, keep_frames = false, json = false;
 };
 
 // With --once, board time without exposures after the USB client has gone that counts as the end.
@@ -146,6 +146,7 @@ class StageRun {
                                             "--pace",       options_.pace,
                                             "--chain-bits", std::to_string(inputs_.stage.chain_bits)};
         if (!options_.vcd.empty()) command.insert(command.end(), {"--vcd", options_.vcd});
+        if (options_.can) command.insert(command.end(), {"--can", options_.work + "/can.sock", "--lamp-nodes"});
         for (const std::string& fault : options_.board_faults) command.insert(command.end(), {"--inject", fault});
         return BoardProcess::start(command);
     }
@@ -274,6 +275,8 @@ void add_run_verb(CLI::App& app, int& exit_code) {
                      "off: float RGB counts without noise, mosaic, quantisation, saturation")
         ->check(CLI::IsMember({"on", "off"}));
     verb->add_option("--board-program", options->board_program, "the emulated board's board.mjs");
+    verb->add_flag("--can", options->can,
+                   "a CAN bus, WORK/can.sock: the board is on it, and the lamp nodes with their telemetry");
     verb->add_flag("--no-board", options->no_board, "wait for a board that connects to WORK/exposures.sock by itself");
     verb->add_flag("--keep-frames", options->keep_frames,
                    "keep every frame in WORK/camN.frames.bin, too: id and time (64 bits each), then 16-bit samples");

@@ -4,6 +4,7 @@
 import { Board } from './board_model.mjs';
 import { CanBus } from './can/can_bus.mjs';
 import { CanSocket } from './can/can_socket.mjs';
+import { LampNodes } from './can/lamp_nodes.mjs';
 import { ExposureRecorder } from './exposures.mjs';
 import { ExposureSocket } from './exposure_socket.mjs';
 import { readImage } from './image.mjs';
@@ -35,6 +36,7 @@ async function main() {
     ? new ExposureRecorder(options.chainBits, (exposure) => stage.send(exposure), pins, options.activeLow) : null;
 
   const canBus = options.can ? new CanBus(options.canBitRate) : null;
+  const lampNodes = options.lampNodes ? new LampNodes(canBus, options.chainBits, pins) : null;
   const violations = new Violations(log);
   const board = new Board(image, {
     violations,
@@ -49,10 +51,12 @@ async function main() {
     crystal_ms: options.crystal_ms,
     sioOut: options.sioOut,
     injections: options.inject,
+    lampNodes,
     log,
     onEdge: (tick, levels) => {
       vcd?.edge(tick, levels);
       recorder?.edge(tick, levels);
+      lampNodes?.edge(tick, levels);
     },
     onReset: (cause) => {
       usb?.drop();
@@ -61,7 +65,7 @@ async function main() {
     onUnplug: () => usb?.drop(),
   });
   const can = canBus ? new CanSocket(options.can, canBus, { onActivity: () => pacer.wake(), log }) : null;
-  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage, can,
+  const pacer = new Pacer(board, { pace: options.pace, ticksLimit: options.cyclesLimit, stage, can, lampNodes,
                                    openSince: () => recorder?.openSince ?? Infinity });
   const usb = options.usb ? new UsbSocket(options.usb, {
     host: () => board.usbHost,

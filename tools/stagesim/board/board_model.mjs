@@ -42,6 +42,7 @@ export class Board {
    * @param {number} options.sioOut what SIO's GPIO_OUT holds at the start
    * @param {object[]} options.injections from parseInjection
    * @param {import('./can/can_bus.mjs').CanBus | null} options.canBus joins the board's CAN controller to it
+   * @param {import('./can/lamp_nodes.mjs').LampNodes | null} [options.lampNodes] that injections make fail
    * @param {import('./chip/violations.mjs').Violations} options.violations
    * @param {(text: string) => void} options.log
    * @param {(tick: number, levels: number) => void} options.onEdge a pin of the board has changed; undriven pins are 0
@@ -64,6 +65,11 @@ export class Board {
 
   get pins() {
     return this.#options.pins;
+  }
+
+  /** The lamp nodes on its bus. */
+  get lampNodes() {
+    return this.#options.lampNodes;
   }
 
   get chip() {

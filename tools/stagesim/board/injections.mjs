@@ -32,6 +32,9 @@ const FAULTS = {
   canclock: (board, ticks) => board.oscillate(board.pins.can.pins.CAN_INTERRUPT, ticks),
   short: (board, gpio, level) => board.short(gpio, level === 1),
   unshort: (board, gpio) => board.short(gpio, null),
+  lampfault: (board, node, faults) => board.lampNodes.setFault(node, faults),
+  lampopen: (board, node, output) => board.lampNodes.open(node, output),
+  lampsilent: (board, node) => board.lampNodes.silence(node),
   release: (board) => Object.values(board.pins.stopInputs).forEach((gpio) => board.drive(gpio, true)),
 };
 /** How many numbers a fault takes, at least and at most, and what each must be below; none where it is not here. */
@@ -39,6 +42,8 @@ const NUMBERS = { starve: { least: 0, below: [12] }, upset: { least: 1, below: [
                   genlockclock: { least: 1, below: [1e9] }, openlampclock: { least: 1, below: [1e9] },
                   canclock: { least: 1, below: [1e9] },
                   flip: { least: 2, below: [0x20042000, 8] }, short: { least: 2, below: [30, 2] },
+                  lampfault: { least: 2, below: [16, 256] }, lampopen: { least: 2, below: [16, 16] },
+                  lampsilent: { least: 1, below: [16] },
                   unshort: { least: 1, below: [30] } };
 
 /**

@@ -19,6 +19,7 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
   --chip-revision R   the chip's stepping: b0, b1 or b2 (default b2)
   --can SOCKET        fit a CAN controller, and listen there for nodes of its bus ("CAN frames over a socket")
   --can-kbit-s N      the bus's bit rate (default 1000)
+  --lamp-nodes        put the lamps' drivers on that bus, which tell temperature, current and faults each second
   --exposures SOCKET  connect there and send every exposure as a JSON line
   --vcd FILE          write the board's signals as a value change dump
   --pace virtual      time stops while the reader of exposures is behind or nothing is to be done (default)
@@ -38,7 +39,8 @@ Runs the board's firmware, the same image that is flashed, on an emulated RP2040
                       fatalbuserror so that the controller locks up (RP2040-E15), usblockup locks it up at once; estop,
                       overtemperature, openlamp pull that input low, release lets all go high; genlock and genlockfall
                       are edges of that input; genlockclock:TICKS, openlampclock:TICKS and canclock:TICKS let an input
-                      change that often; short:GPIO:LEVEL of a pad, whatever drives it, unshort:GPIO
+                      change that often; lampfault:NODE:BITS (wire.h, ols_lamp_fault), lampopen:NODE:OUTPUT and
+                      lampsilent:NODE of a lamp node; short:GPIO:LEVEL of a pad, whatever drives it, unshort:GPIO
   --stats             print ticks, speed, dropped lines and violations as JSON at the end
   --help
 
@@ -61,6 +63,7 @@ export function parseOptions(args) {
         'chain-bits': { ...text, default: '176' }, naive: flag, 'cycles-limit': text, seed: { ...text, default: '1' },
         'board-id': { ...text, default: '4f4c532d56495254' },
         inject: { type: 'string', multiple: true, default: [] },
+        'lamp-nodes': flag,
         'active-low': { type: 'string', multiple: true, default: [] }, stats: flag, help: flag, 'flash-as-is': flag,
         'rosc-mhz': { ...text, default: '6.5' }, 'crystal-ms': { ...text, default: '6' }, 'sio-out': { ...text, default: '0' },
       },
@@ -76,8 +79,14 @@ export function parseOptions(args) {
   }
   const chainBits = integer('--chain-bits', values['chain-bits'], 4);
   if (chainBits % 4 !== 0) throw new Error(`--chain-bits ${chainBits}: not a multiple of 4`);
+  if (values['lamp-nodes'] && !values.can) throw new Error('--lamp-nodes: they are on the CAN bus; give --can');
+  const inject = values.inject.map(parseInjection);
+  if (!values['lamp-nodes'] && inject.some(({ name }) => name.startsWith('lamp'))) {
+    throw new Error('--inject lamp...: there are no lamp nodes; give --lamp-nodes');
+  }
   return {
     ...values,
+    lampNodes: values['lamp-nodes'],
     chainBits,
     stepping: values['chip-revision'],
     busyHub: values['busy-hub'],
@@ -89,7 +98,7 @@ export function parseOptions(args) {
     cyclesLimit: values['cycles-limit'] ? integer('--cycles-limit', values['cycles-limit'], 1) : Infinity,
     activeLow: values['active-low'].map((text) => trigger(text)),
     boardId: identity(values['board-id']),
-    inject: values.inject.map(parseInjection),
+    inject,
   };
 }
 

@@ -29,6 +29,7 @@ export class Pacer {
   #limit;
   #stage;
   #can;
+  #lampNodes;
   #stopped = false;
   #wake = () => {};
   #woken = false;
@@ -42,16 +43,17 @@ export class Pacer {
   #openSince;
 
   /**
-   * @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null, can?: object | null, openSince?: () => number}} options
+   * @param {{pace: 'virtual' | 'wall', ticksLimit: number, stage: object | null, can?: object | null, lampNodes?: object | null, openSince?: () => number}} options
    *   openSince: the tick at which the oldest exposure still under way began, Infinity when none is
    */
-  constructor(board, { pace, ticksLimit, stage, can = null, openSince = () => Infinity }) {
+  constructor(board, { pace, ticksLimit, stage, can = null, lampNodes = null, openSince = () => Infinity }) {
     this.#openSince = openSince;
     this.#board = board;
     this.#pace = pace;
     this.#limit = ticksLimit;
     this.#stage = stage;
     this.#can = can;
+    this.#lampNodes = lampNodes;
     this.#startTick = board.tick;
     if (stage) stage.onReady = () => this.#resume();
   }
@@ -109,6 +111,7 @@ export class Pacer {
     const length = this.#can?.hasClients && this.#quietSince === null ? CAN_SLICE_TICKS : SLICE_TICKS;
     board.run(Math.min(from + length, this.#limit));
     this.#running_ns += process.hrtime.bigint() - begin;
+    this.#lampNodes?.advance(board.tick);
     this.#can?.tell(board.tick);
     this.#stage?.send({ type: 'now', tick: Math.min(board.tick, this.#openSince()) });
     const busy = !board.quiet || board.awakeCycles < awake || board.awakeCycles - awake > AWAKE_FRACTION * length;
