@@ -18,6 +18,9 @@ namespace {
 constexpr size_t buffers_bytes = size_t(256) << 20;
 constexpr size_t buffers_min = 16, buffers_max = 1024;
 constexpr int socket_bytes = 32 << 20;
+// Packets of a frame that may be asked for again, by how many it has. Most of the first frame may be lost: the library enlarges its
+// socket when that one's first packet has come.
+constexpr double asked_again = 1;
 constexpr uint64_t no_frame = UINT64_MAX;  // the id of a buffer that has none
 
 constexpr uint32_t timestamp_control = 0x0944, timestamp_latch = 2, timestamp_high = 0x0948, timestamp_low = 0x094c;
@@ -175,7 +178,7 @@ Result<std::unique_ptr<AravisStream>> AravisLink::make_stream(std::string& chose
     chosen = fmt::format("{} buffers of {} bytes", buffers, *payload);
     if (is_gige()) {
         g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes,
-                     nullptr);
+                     "packet-request-ratio", asked_again, nullptr);
         ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
         g_object_get(made, "packet-resend", &resend, nullptr);
         chosen =

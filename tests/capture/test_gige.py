@@ -38,7 +38,8 @@ def features(address):
         ["arv-tool-0.8", "-a", address, "control", *names], capture_output=True, text=True, timeout=120
     )
     assert done.returncode == 0, done.stderr
-    return dict(line.split(" = ") for line in done.stdout.splitlines() if " = " in line)
+    lines = (line.split(" = ") for line in done.stdout.splitlines() if " = " in line)
+    return {name: value.split()[0] for name, value in lines}  # "64 min:8 max:2048"
 
 
 def test_a_take_over_gige_vision_is_that_of_the_ring_bit_for_bit(tmp_path):
