@@ -68,12 +68,12 @@ Result<int> run(const Options& options) {
     const auto sequence = open_compiled(options.sequence, options.cycles, *stage);
     if (!sequence.ok()) return sequence.error();
     StopRequest& stop = stop_on_signal();
+    auto board = open_board(options.links, *stage);
+    if (!board.ok()) return board.error();
     auto watch = StageWatch::open(*stage, stop);
     if (!watch.ok()) return watch.error();
     if (options.arm && !watch->has_arm_button())
         return fail("--arm: the stage has no arm button: add [gpio.arm] to the stage");
-    auto board = open_board(options.links, *stage);
-    if (!board.ok()) return board.error();
     std::unique_ptr<BoardRelay> relay;
     if (!options.share.empty()) {
         auto listening = BoardRelay::listen(options.share);

@@ -58,12 +58,12 @@ Result<int> run(const Options& options) {
     auto planned = plan_archives(options.take, *sequence, *stage, *targets);
     if (!planned.ok()) return planned.error();
     StopRequest& stop = stop_on_signal();
-    auto watch = StageWatch::open(*stage, stop);
+    auto session = open_session(options.links);
+    if (!session.ok()) return session.error();
+    auto watch = StageWatch::open(*stage, stop);  // behind the session, whose wait is for a virtual stage's bus, too
     if (!watch.ok()) return watch.error();
     const auto waits = waits_for_arm(options, *watch);
     if (!waits.ok()) return waits.error();
-    auto session = open_session(options.links);
-    if (!session.ok()) return session.error();
 
     const TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
     std::optional<LineFile> account;

@@ -77,8 +77,8 @@ async function main() {
     log,
   }) : null;
   if (stage) stage.now = () => Math.min(board.tick, recorder.openSince);
-  await usb?.listen();
   await can?.listen();
+  await usb?.listen(); // last: whoever can reach it finds all of the board
 
   stage?.send({ type: 'hello', tick_hz: TICK_HZ, chain_bits: options.chainBits, firmware: image.name });
   for (const signal of ['SIGTERM', 'SIGINT']) process.on(signal, () => pacer.stop());
