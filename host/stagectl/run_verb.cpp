@@ -24,7 +24,7 @@ struct Options {
     SequenceOptions sequence;
     std::string output, calibration, frames;
     TakeInfo slate;
-    int cycles = 0;
+    int cycles = 0, witness_step = TakeDescription{}.witness_step;
     std::string fill = "none", estimate = "none", quality;
     std::vector<std::string> also;  // QUALITY=ARCHIVE
     double fps = 0;
@@ -70,6 +70,9 @@ nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
             {"estimated_share", report.estimated_share},
             {"unsolved_share", report.unsolved_share},
             {"misaligned_share", report.misaligned_share},
+            {"suspect_targets", report.suspicion.suspect_targets},
+            {"suspicions", report.suspicion.targets},
+            {"suspect_lamps", report.suspicion.lamps},
             {"seconds",
              {{"develop", report.seconds_develop},
               {"flow", report.seconds_motion.flow},
@@ -111,12 +114,32 @@ void print_output(const OutputReport& report, const std::string& folder, const O
             report.unsolved_share * 100,
             options.estimate == "clipped" ? "" : "--estimate clipped counts saturated ones as they were read, ",
             options.estimate == "clipped" ? "" : " too");
+    print_suspicion(report.suspicion, folder);
     if (report.misaligned_share > 0)
         fmt::print(stderr,
                    "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",
                    report.misaligned_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
+}
+
+// What the first suspect target and each suspect lamp are suspected of.
+void print_suspicion(const SuspicionReport& suspicion, const std::string& folder) {
+    if (suspicion.suspect_targets > 0) {
+        const nlohmann::json& first = suspicion.targets[0];
+        fmt::print(
+            stderr,
+            "stagectl: {} targets have a slot that does not fit the others (suspect_targets in {}/manifest.json); "
+            "target {}: {}{}\n",
+            suspicion.suspect_targets, folder, first["target"].get<int>(), first["says"][0].get<std::string>(),
+            first.contains("taken_as_missing") ? ", and was taken as missing" : "");
+    }
+    for (const auto& [name, lamp] : suspicion.lamps.items())
+        fmt::print(stderr,
+                   "stagectl: {} gave {:.2f} +- {:.2f} of the light that {}, from target {} on: look at the lamp\n",
+                   name, lamp["factor"].get<double>(), lamp["spread"].get<double>(),
+                   lamp["since_first_target"].get<bool>() ? "it gave in the first target" : "its neighbours foretell",
+                   lamp["first_target"].get<int>());
 }
 
 void print_report(const TakeReport& report, bool is_estimate, const std::vector<Planned>& planned,
@@ -265,7 +288,7 @@ Result<int> run(const Options& options) {
     auto session = open_session(options.links);
     if (!session.ok()) return session.error();
 
-    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options)};
+    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options), options.witness_step};
     std::optional<LineFile> account;
     TakeSinks sinks{{},
                     [&](const Frame& frame) {
@@ -338,6 +361,11 @@ void add_run_verb(CLI::App& app, int& exit_code) {
             "so that a glint is about as bright as the camera's white. Estimates are masked; those of a prior have a "
             "bound of their bias")
         ->check(CLI::IsMember(estimate_names()));
+    verb->add_option("--witness-step", options->witness_step,
+                     "every so manieth pixel in x and in y is looked at for slots that do not fit the others and lamps "
+                     "that give less "
+                     "light; 0: none (docs/identity.md has what each step finds and costs)")
+        ->check(CLI::Range(0, 1000));
     verb->add_flag("--overwrite", options->overwrite, "replace an archive of that name");
     verb->add_flag("--float", options->single_float, "store 32-bit floats; otherwise half floats");
     verb->add_option("--production", options->slate.production, "slate: production");

@@ -91,7 +91,8 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
 }
 
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
-                             const RecordReport& record, const nlohmann::json& missing) {
+                             const RecordReport& record, const nlohmann::json& missing,
+                             const SuspicionReport& suspicion) {
     nlohmann::json json = {{"sequence", describe_sequence(take.sequence)},
                            {"board", {{"id", board.id()}, {"firmware", board.info().firmware_version}}},
                            {"calibration", take.calibration.source},
@@ -109,6 +110,8 @@ nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& tar
                              {"board_end", record.board_end},
                              {"camera_end", record.camera_end},
                              {"camera", camera_record(record.camera, record.camera_counts)}}}};
+    if (!suspicion.targets.is_null()) json["suspect_targets"] = suspicion.targets;
+    if (!suspicion.lamps.is_null()) json["suspect_lamps"] = suspicion.lamps;
     if (targets.every > 0) json["motion"] = describe_motion(take.sequence, targets);
     return json;
 }

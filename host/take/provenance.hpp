@@ -16,6 +16,7 @@ nlohmann::json provenance_of(const TargetFrames& frames, const Sequence& sequenc
 
 // Of the take, for the manifest's `extra`. `missing`: one account (missing_ranges.hpp) a camera.
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const Board& board,
-                             const RecordReport& record, const nlohmann::json& missing);
+                             const RecordReport& record, const nlohmann::json& missing,
+                             const SuspicionReport& suspicion);
 
 }  // namespace ols

@@ -47,11 +47,13 @@ class Output {
                 developed.saturated_share, developed.estimated_share,
                 developed.unsolved_share,  developed.misaligned_share,
                 developed.seconds,         written.seconds,
-                developed.seconds_motion,  written.error};
+                developed.seconds_motion,  written.error,
+                developed.suspicion};
     }
 
     Status finish(const TakeDescription& take, const Board& board, const RecordReport& record) {
-        archive_.add_to_manifest(describe_take(take, targets_, board, record, developer_.missing_json()));
+        archive_.add_to_manifest(
+            describe_take(take, targets_, board, record, developer_.missing_json(), developer_.finish().suspicion));
         return archive_.finish();
     }
 

@@ -36,6 +36,7 @@ struct TakeDescription {
     StageConfig stage;
     Calibration calibration;  // of the stage's cameras, in their order
     TakeMasks masks;
+    int witness_step = 5;  // DevelopOptions::witness_step
 };
 
 // What it is recorded with.
@@ -59,6 +60,14 @@ struct TakeSinks {
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
 };
 
+// What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).
+struct SuspicionReport {
+    int suspect_targets = 0;  // of which a slot is suspect
+    nlohmann::json targets;   // of the first of these: "target", "suspect", "says", "taken_as_missing"
+    nlohmann::json lamps;     // by lamp, as in the last target that named it, with "first_target" and "last_target"
+    static constexpr size_t targets_max = 100;  // that are listed
+};
+
 // Of one archive.
 struct OutputReport {
     int targets_written = 0, targets_missing = 0;
@@ -68,6 +77,7 @@ struct OutputReport {
     double seconds_develop = 0, seconds_write = 0;  // busy in each thread
     MotionDeveloper::Times seconds_motion;          // parts of seconds_develop, of a performance
     std::string write_error;                        // what could not be written first, and why; empty when all was
+    SuspicionReport suspicion;
 };
 
 struct TakeReport {
