@@ -18,6 +18,9 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+// Of the first target's mean over the lamps: darker ones, whose quotients are noisy, are not compared with it.
+constexpr double quotient_light_least = 0.2;
+
 bool has(const std::vector<int>& images, int image) {
     return std::ranges::find(images, image) != images.end();
 }
@@ -32,9 +35,9 @@ LampWitness::LampWitness(const Basis& basis, const std::vector<LightPosition>& l
         for (int row = 0; row < basis.rows; ++row) inverse_(image, row) = basis.inverse(row, image);
 }
 
-// What is left out takes the value that the others foretell, all of it at once: the mean of K conditioned on the rest.
-Eigen::VectorXd LampWitness::factors(Eigen::VectorXd values, const std::vector<int>& left_out) const {
-    const Eigen::VectorXd measured = values;
+// What is left out takes the value that the others foretell, all of it at once: the mean of K conditioned on the rest. Its own
+// weight is 0 then, and it stays as foretold.
+Eigen::VectorXd LampWitness::foretell(Eigen::VectorXd values, const std::vector<int>& left_out) const {
     double sum = 0;
     for (int image = 0; image < basis_.images(); ++image) sum += has(left_out, image) ? 0 : values(image);
     const double mean = sum / double(basis_.images() - int(left_out.size()));
@@ -42,42 +45,48 @@ Eigen::VectorXd LampWitness::factors(Eigen::VectorXd values, const std::vector<i
     if (!left_out.empty()) {
         values(left_out).setZero();
         const Eigen::VectorXd pulled = (precision_ * values)(left_out);
-        values(left_out) = -Eigen::LLT<Eigen::MatrixXd>(precision_(left_out, left_out)).solve(pulled);
+        const Eigen::MatrixXd own = precision_(left_out, left_out);
+        values(left_out) = -Eigen::LLT<Eigen::MatrixXd>(own).solve(pulled);
     }
-    // In what is left out the quotient is 0, and its value stays the foretold one.
-    const Eigen::VectorXd foretold =
-        (values.array() - (precision_ * values).array() / precision_.diagonal().array()) + mean;
-    return (foretold.array() > light_least * mean).select(measured.array() / foretold.array(), NAN);
+    return (values.array() - (precision_ * values).array() / precision_.diagonal().array()) + mean;
 }
 
 // The one that is farthest below is left out, and the rest foretold anew: beside a dark lamp its neighbours look bright, and
 // those that are dim next to others that are, less dim than they are.
-std::vector<LampFinding> LampWitness::find(const Eigen::VectorXd& values, std::vector<int> unknown,
-                                           double noise) const {
+LampWitness::Found LampWitness::find(const Eigen::VectorXd& values, std::vector<int> unknown,
+                                     const Eigen::VectorXd& noise) const {
     const size_t unknown_count = unknown.size();
     std::vector<int>& left_out = unknown;
     for (;;) {
-        const Eigen::VectorXd found = factors(values, left_out);
-        std::vector<double> off;
+        const Eigen::VectorXd foretold = foretell(values, left_out);
+        const Eigen::VectorXd off = (values - foretold).cwiseQuotient(noise);
+        std::vector<double> sizes;
         int weakest = -1;
+        double most_above = 0;
         for (int image = 0; image < basis_.images(); ++image) {
-            if (has(left_out, image) || std::isnan(found(image))) continue;
-            off.push_back(std::abs(found(image) - 1));
-            if (weakest < 0 || found(image) < found(weakest)) weakest = image;
+            if (has(left_out, image)) continue;
+            sizes.push_back(std::abs(off(image)));
+            most_above = std::max(most_above, off(image));
+            if (weakest < 0 || off(image) < off(weakest)) weakest = image;
         }
-        if (off.size() < 3) return {};
-        const double spread = std::max(1.4826 * median(off), noise);
-        if (1 - found(weakest) >= sigma_least * spread) {
-            if (left_out.size() - unknown_count == size_t(lamps_max)) return {};
+        if (sizes.size() < 3) return {};
+        const double spread = std::max({1.4826 * median(sizes), most_above / 3, 1.0});
+        const auto is_weak = [&](int image) { return off(image) <= -sigma_least * spread; };
+        if (left_out.size() - unknown_count == size_t(lamps_max) && is_weak(weakest)) return {};
+        // While there are others that are as far above as it is below, it may be they that the dark one makes look so.
+        if (left_out.size() - unknown_count < size_t(lamps_max) && -off(weakest) > 2 * std::max(spread, most_above)) {
             left_out.push_back(weakest);
             continue;
         }
-        std::vector<LampFinding> findings;
+        Found found;
+        for (int image = 0; image < basis_.images(); ++image)
+            found.unjudged += foretold(image) < sigma_least * spread * noise(image);
         for (size_t k = unknown_count; k < left_out.size(); ++k)
-            if (const double factor = found(left_out[k]); 1 - factor >= sigma_least * spread)
-                findings.push_back({left_out[k], factor, spread, false});
-        std::ranges::sort(findings, {}, &LampFinding::factor);
-        return findings;
+            if (const int image = left_out[k]; is_weak(image) && foretold(image) > 0)
+                found.lamps.push_back(
+                    {image, values(image) / foretold(image), spread * noise(image) / foretold(image), false});
+        std::ranges::sort(found.lamps, {}, &LampFinding::factor);
+        return found;
     }
 }
 
@@ -92,33 +101,31 @@ std::vector<LampFinding> LampWitness::judge(const ParitySamples& samples) {
     }
     if (count == 0 || basis_.images() < 3) return {};
     const Eigen::VectorXd values = inverse_ * rows / count;
-    const double mean = values.mean();
-    if (mean <= 0) return {};
+    if (values.mean() <= 0) return {};
     // Of a lamp's mean, from the camera's noise.
     const double noise = std::sqrt(variance * inverse_.squaredNorm() / double(basis_.images())) / count;
-    std::vector<LampFinding> findings = find(values, {}, noise / mean);
-    unjudged_ = int(factors(values, {}).array().isNaN().count());
+    Found found = find(values, {}, Eigen::VectorXd::Constant(values.size(), noise));
+    unjudged_ = found.unjudged;
     if (first_.size() == 0) {
         first_ = values;
-        return findings;
+        return found.lamps;
     }
-    // Against the first target: its own pattern over the lamps is divided out, where it was lit.
-    Eigen::VectorXd quotients = values.array() / first_.array();
+    // Against the first target: its own pattern over the lamps is divided out, where it was lit well enough.
+    Eigen::VectorXd quotients = values.array() / first_.array(), noises = noise * std::sqrt(2.0) / first_.array();
     std::vector<int> unknown;
     for (int image = 0; image < basis_.images(); ++image)
-        if (first_(image) <= light_least * first_.mean()) unknown.push_back(image), quotients(image) = 0;
-    if (int(unknown.size()) > basis_.images() / 2) return findings;
-    // Of the darkest lamp's quotient.
-    const double quotient_noise = noise * std::sqrt(2.0) / (light_least * first_.mean());
-    for (LampFinding change : find(quotients, unknown, quotient_noise)) {
+        if (first_(image) <= quotient_light_least * first_.mean())
+            unknown.push_back(image), quotients(image) = 0, noises(image) = 1;
+    if (int(unknown.size()) > basis_.images() / 2) return found.lamps;
+    for (LampFinding change : find(quotients, unknown, noises).lamps) {
         change.is_new = true;
-        const auto same = std::ranges::find(findings, change.image, &LampFinding::image);
-        if (same == findings.end())
-            findings.push_back(change);
+        const auto same = std::ranges::find(found.lamps, change.image, &LampFinding::image);
+        if (same == found.lamps.end())
+            found.lamps.push_back(change);
         else
             *same = change;
     }
-    return findings;
+    return found.lamps;
 }
 
 }  // namespace ols

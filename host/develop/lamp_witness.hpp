@@ -5,9 +5,10 @@
 // lamp. What tells is the picture's mean under each lamp, x. Calibrated reflectance of a whole picture changes little from a lamp to its
 // neighbours 18 degrees away, so that the others foretell each of them:
 //     x_l - [K^-1 (x - m)]_l / [K^-1]_ll                 (the leave-one-out mean of a Gaussian process, Rasmussen and Williams 2006, eq. 5.12)
-// with K the kernel of the estimates (fill_model.hpp) and m the mean. How far lamps are from what is foretold, in the robust spread over all
-// lamps, is the uncertainty that a factor is given with: of a glossy or a folded subject it is large, and then little can be told.
-// Against an earlier target of the take the subject's own unevenness cancels, and smaller changes show.
+// with K the kernel of the estimates (fill_model.hpp) and m the mean. How far lamps are from what is foretold is the uncertainty that a factor is
+// given with: their robust spread, and a third of the most that any lamp is above, since no lamp that fails is. Of a glossy or folded
+// subject that is large, and less can be told; lamps whose failing would not stand out are counted. Against the first target of the
+// take the subject's own unevenness cancels, and smaller changes show.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,11 +30,8 @@ struct LampFinding {
 
 class LampWitness {
   public:
-    // A lamp is named that is so many spreads below what is foretold. By noise alone a millionth of takes has such a lamp; spreads are
-    // not normal where subjects are glossy, and a subject's own edge is not a lamp's.
+    // A lamp is named that is so many spreads below what is foretold: twice as far as any is above.
     static constexpr double sigma_least = 6;
-    // Of the mean over the lamps: what is foretold to be darker than that (lamps behind the subject) is not judged.
-    static constexpr double light_least = 0.1;
     static constexpr int lamps_max = 16;  // that may be named; beyond, the subject is not what is foretold
 
     LampWitness(const Basis& basis, const std::vector<LightPosition>& lamps);
@@ -41,14 +39,18 @@ class LampWitness {
     // Weakest first. Targets in their order, each once.
     std::vector<LampFinding> judge(const ParitySamples& samples);
 
-    // Lamps of the last target that were foretold too dark to be judged.
+    // Lamps of the last target that would not be named were they dark, by their neighbours: mostly those behind the subject.
     int unjudged() const { return unjudged_; }
 
   private:
-    // Of each image its value over what is foretold without it and without `left_out`; NaN where that is too dark.
-    Eigen::VectorXd factors(Eigen::VectorXd values, const std::vector<int>& left_out) const;
-    // `unknown`: images of which there are no values.
-    std::vector<LampFinding> find(const Eigen::VectorXd& values, std::vector<int> unknown, double noise) const;
+    // What the others foretell of each image, without those of `left_out`.
+    Eigen::VectorXd foretell(Eigen::VectorXd values, const std::vector<int>& left_out) const;
+    struct Found {
+        std::vector<LampFinding> lamps;
+        int unjudged = 0;
+    };
+    // `unknown`: images of which there are no values. `noise`: the deviation of each value.
+    Found find(const Eigen::VectorXd& values, std::vector<int> unknown, const Eigen::VectorXd& noise) const;
 
     const Basis& basis_;
     Eigen::MatrixXd precision_, inverse_;  // K^-1, images x images; images x rows

@@ -66,6 +66,43 @@ double energy_along(const RunSums& run, const Eigen::VectorXd& direction) {
     return square > 0 ? double(direction.transpose() * run.checks * direction) / square : 0;
 }
 
+// sum w y_i y_k - sum w y_j y_k for all k.
+Eigen::VectorXd row_of_difference(const StripSums& strip, const Pair& pair) {
+    const auto row = [&](int i) {
+        Eigen::VectorXd own = strip.rows.col(i).cast<double>();
+        own.head(i) = strip.rows.row(i).head(i).transpose().cast<double>();
+        return own;
+    };
+    const double means = strip.mean_rows(pair.i) - strip.mean_rows(pair.j);
+    return (row(pair.i) - row(pair.j)).array() + means;
+}
+
+// Of the sigmas of all pairs, when this one's swap is undone in a run of strips: pictures of one subject under half of the lamps are much
+// alike, so that a swap shows in the sigmas of all pairs.
+double spread_without(const ParityEvidence& evidence, const std::vector<Pair>& pairs, const Pair& undone, int first,
+                      int last) {
+    const Eigen::VectorXd c = evidence.checks.row(undone.i) - evidence.checks.row(undone.j);
+    const Eigen::Index rows = evidence.checks.rows();
+    Eigen::MatrixXd check_rows = Eigen::MatrixXd::Zero(c.size(), rows), squares = Eigen::MatrixXd::Zero(rows, rows);
+    double noise = 0;
+    for (int s = first; s <= last; ++s) {
+        const StripSums& strip = evidence.strips[size_t(s)];
+        check_rows += strip.check_rows - c * row_of_difference(strip, undone).transpose();
+        squares += strip.rows.cast<double>(), noise += strip.noise;
+    }
+    const Eigen::MatrixXd product = evidence.checks * check_rows;
+    std::vector<double> sigmas;
+    for (const auto& [i, j] : pairs) {
+        if (i == undone.i || i == undone.j || j == undone.i || j == undone.j) continue;
+        const double c2 = (evidence.checks.row(i) - evidence.checks.row(j)).squaredNorm();
+        const double square = squares(i, i) + squares(j, j) - 2 * squares(j, i);
+        if (c2 * square <= 0) continue;
+        const double a = product(i, i) - product(i, j) - product(j, i) + product(j, j);
+        sigmas.push_back((a - c2 * noise) / std::sqrt(c2 * square));
+    }
+    return robust_spread(std::move(sigmas));
+}
+
 }  // namespace
 
 double robust_spread(std::vector<double> values) {
@@ -123,57 +160,49 @@ std::optional<RowFinding> find_swapped(const ParityEvidence& evidence) {
     struct Candidate {
         Pair pair;
         double evidence, sigma, deviation;
-        int strips;
+        int first, last;  // strip
     };
     const std::vector<Pair> pairs = pairs_of(evidence);
     const auto count = evidence.strips.size();
     std::vector<Eigen::MatrixXd> products;  // N_i . sum w z y_j
     for (const StripSums& strip : evidence.strips) products.push_back(evidence.checks * strip.check_rows);
     std::vector<Candidate> candidates;
-    std::vector<double> sigmas;
     for (const Pair& pair : pairs) {
         const auto [i, j] = pair;
         const double c2 = (evidence.checks.row(i) - evidence.checks.row(j)).squaredNorm();
         if (c2 < parallel * evidence.checks.row(i).squaredNorm()) continue;
-        const auto sums = [&](size_t s) {
-            const Eigen::MatrixXd& product = products[s];
-            return std::pair{product(i, i) - product(i, j) - product(j, i) + product(j, j),
-                             difference(evidence.strips[s], pair)};
-        };
         struct Run {
             double a = 0, square = 0, noise = 0, energy = 0;
-            int strips = 0;
+            int first = 0, last = -1;
             double likelihood(double c2) const { return 2 * a - c2 * square; }
         };
-        Run run, best, whole;  // Kadane's: the run of strips with the largest sum
+        Run run, best;  // Kadane's: the run of strips with the largest sum
         for (size_t s = 0; s < count; ++s) {
-            const auto [a, square] = sums(s);
-            if (run.likelihood(c2) <= 0) run = {};
-            for (Run* one : {&run, &whole}) {
-                one->a += a, one->square += square, one->noise += evidence.strips[s].noise;
-                one->energy += evidence.strips[s].checks.trace(), ++one->strips;
-            }
-            if (best.strips == 0 || run.likelihood(c2) > best.likelihood(c2)) best = run;
+            if (run.likelihood(c2) <= 0) run = {.first = int(s)};
+            const Eigen::MatrixXd& product = products[s];
+            run.a += product(i, i) - product(i, j) - product(j, i) + product(j, j);
+            run.square += difference(evidence.strips[s], pair), run.noise += evidence.strips[s].noise;
+            run.energy += evidence.strips[s].checks.trace(), run.last = int(s);
+            if (best.last < 0 || run.likelihood(c2) > best.likelihood(c2)) best = run;
         }
-        if (whole.square > 0) sigmas.push_back((whole.a - c2 * whole.noise) / std::sqrt(c2 * whole.square));
         if (best.likelihood(c2) <= 0) continue;
         const double left = (best.energy - best.likelihood(c2)) / (double(evidence.checks.cols()) * best.noise);
         const double deviation = std::sqrt(c2 * best.square * std::max(1.0, left));
         candidates.push_back(
-            {pair, best.likelihood(c2), (best.a - c2 * best.noise) / deviation, 2 * deviation, best.strips});
+            {pair, best.likelihood(c2), (best.a - c2 * best.noise) / deviation, 2 * deviation, best.first, best.last});
     }
     if (candidates.empty()) return {};
-    const double spread = robust_spread(std::move(sigmas));
+    std::ranges::sort(candidates, std::ranges::greater(), &Candidate::evidence);
+    const Candidate best = candidates.front();
+    const double spread = spread_without(evidence, pairs, best.pair, best.first, best.last);
     const double runs = double(count * (count + 1)) / 2;
     const double least = normal_quantile(ParityWitness::false_alarms / (double(pairs.size()) * runs));
-    std::erase_if(candidates, [&](const Candidate& one) { return one.sigma / spread < least; });
-    if (candidates.empty()) return {};
-    std::ranges::sort(candidates, std::ranges::greater(), &Candidate::evidence);
+    if (best.sigma / spread < least) return {};
     RowFinding finding{
-        RowFault::swapped, {}, -1, candidates[0].sigma / spread, double(candidates[0].strips) / double(count)};
+        RowFault::swapped, {}, -1, best.sigma / spread, double(best.last - best.first + 1) / double(count)};
     for (const Candidate& one : candidates)
         if (finding.candidates.size() < candidates_max &&
-            candidates[0].evidence - one.evidence <= rival_sigma * spread * candidates[0].deviation / 2)
+            best.evidence - one.evidence <= rival_sigma * spread * best.deviation / 2)
             finding.candidates.push_back({one.pair.i, one.pair.j});
     return finding;
 }
@@ -194,8 +223,9 @@ std::optional<RowFinding> find_mislit(const ParityEvidence& evidence) {
     const RunSums whole = run_sums(evidence, 0, parity_strips - 1);
     const Eigen::MatrixXd& w = evidence.inverse;
     const Eigen::VectorXd sums = w.rowwise().sum(), crossed = w * mean_rows;
+    const Eigen::MatrixXd images = w * square;  // times W' and with the means: sum w x x'
     const Eigen::VectorXd energies =
-        (w * square).cwiseProduct(w).rowwise().sum() + 2 * crossed.cwiseProduct(sums) + mean_square * sums.cwiseAbs2();
+        images.cwiseProduct(w).rowwise().sum() + 2 * crossed.cwiseProduct(sums) + mean_square * sums.cwiseAbs2();
     const Eigen::MatrixXd products = check_rows * w.transpose();  // sum w z x_l, d x lamps
     const double scale = std::max(1.0, whole.energy / (double(evidence.checks.cols()) * whole.noise));
 
@@ -212,19 +242,29 @@ std::optional<RowFinding> find_mislit(const ParityEvidence& evidence) {
         Eigen::Index lamp = 0;
         double factor = 0, sigma = 0;
     } best;
-    std::vector<double> sigmas;
+    const auto sigma_of = [&](const Eigen::VectorXd& u, Eigen::Index lamp, double a) {
+        return energies(lamp) > 0 ? a / std::sqrt(u.squaredNorm() * energies(lamp) * scale) : 0;
+    };
     for (size_t u = 0; u < directions.size(); ++u)
         for (Eigen::Index lamp = 0; lamp < lamps; ++lamp) {
-            const double u2 = directions[u].squaredNorm(), a = directions[u].dot(products.col(lamp));
-            if (energies(lamp) <= 0) continue;
-            const double sigma = a / std::sqrt(u2 * energies(lamp) * scale);
-            sigmas.push_back(sigma);
-            if (std::abs(sigma) > std::abs(best.sigma)) best = {u, lamp, a / (u2 * energies(lamp)), sigma};
+            const double a = directions[u].dot(products.col(lamp)), sigma = sigma_of(directions[u], lamp, a);
+            if (std::abs(sigma) > std::abs(best.sigma))
+                best = {u, lamp, a / (directions[u].squaredNorm() * energies(lamp)), sigma};
         }
+    if (best.sigma == 0) return {};
+    // Of the others, when this lamp's part is taken out.
+    const Eigen::VectorXd with_best = images * w.row(best.lamp).transpose() + crossed * sums(best.lamp) +
+                                      sums * crossed(best.lamp) + mean_square * sums(best.lamp) * sums;
+    std::vector<double> sigmas;
+    for (const Eigen::VectorXd& u : directions)
+        for (Eigen::Index lamp = 0; lamp < lamps; ++lamp)
+            sigmas.push_back(sigma_of(
+                u, lamp,
+                u.dot(products.col(lamp)) - best.factor * u.dot(directions[best.direction]) * with_best(lamp)));
     const double spread = robust_spread(sigmas);
     const double least = normal_quantile(ParityWitness::false_alarms / (2 * double(sigmas.size())));
     // A factor of 1, to a half: less is explained better by no fault, more by something else than this lamp.
-    if (sigmas.empty() || std::abs(best.sigma) / spread < least || std::abs(std::abs(best.factor) - 1) > 0.5) return {};
+    if (std::abs(best.sigma) / spread < least || std::abs(std::abs(best.factor) - 1) > 0.5) return {};
     RowFinding out{
         RowFault::lamp_out, {}, evidence.basis.image_lamps[size_t(best.lamp)][0], std::abs(best.sigma) / spread, 1};
     RowFinding on = out;

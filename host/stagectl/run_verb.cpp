@@ -103,6 +103,25 @@ nlohmann::json to_json(const TakeReport& report, const std::vector<Planned>& pla
     return json;
 }
 
+// What the first suspect target and each suspect lamp are suspected of.
+void print_suspicion(const SuspicionReport& suspicion, const std::string& folder) {
+    if (suspicion.suspect_targets > 0) {
+        const nlohmann::json& first = suspicion.targets[0];
+        fmt::print(
+            stderr,
+            "stagectl: {} targets have a slot that does not fit the others (suspect_targets in {}/manifest.json); "
+            "target {}: {}{}\n",
+            suspicion.suspect_targets, folder, first["target"].get<int>(), first["says"][0].get<std::string>(),
+            first.contains("taken_as_missing") ? ", and was taken as missing" : "");
+    }
+    for (const auto& [name, lamp] : suspicion.lamps.items())
+        fmt::print(stderr,
+                   "stagectl: {} gave {:.2f} +- {:.2f} of the light that {}, from target {} on: look at the lamp\n",
+                   name, lamp["factor"].get<double>(), lamp["spread"].get<double>(),
+                   lamp["since_first_target"].get<bool>() ? "it gave in the first target" : "its neighbours foretell",
+                   lamp["first_target"].get<int>());
+}
+
 void print_output(const OutputReport& report, const std::string& folder, const Options& options) {
     if (!options.json)
         fmt::print("{}: {} targets written, {} missing\n", folder, report.targets_written, report.targets_missing);
@@ -121,25 +140,6 @@ void print_output(const OutputReport& report, const std::string& folder, const O
                    report.misaligned_share * 100);
     if (!report.write_error.empty()) fmt::print(stderr, "stagectl: {}\n", report.write_error);
     if (report.targets_missing > 0) fmt::print(stderr, "stagectl: why targets are missing: rf verify {}\n", folder);
-}
-
-// What the first suspect target and each suspect lamp are suspected of.
-void print_suspicion(const SuspicionReport& suspicion, const std::string& folder) {
-    if (suspicion.suspect_targets > 0) {
-        const nlohmann::json& first = suspicion.targets[0];
-        fmt::print(
-            stderr,
-            "stagectl: {} targets have a slot that does not fit the others (suspect_targets in {}/manifest.json); "
-            "target {}: {}{}\n",
-            suspicion.suspect_targets, folder, first["target"].get<int>(), first["says"][0].get<std::string>(),
-            first.contains("taken_as_missing") ? ", and was taken as missing" : "");
-    }
-    for (const auto& [name, lamp] : suspicion.lamps.items())
-        fmt::print(stderr,
-                   "stagectl: {} gave {:.2f} +- {:.2f} of the light that {}, from target {} on: look at the lamp\n",
-                   name, lamp["factor"].get<double>(), lamp["spread"].get<double>(),
-                   lamp["since_first_target"].get<bool>() ? "it gave in the first target" : "its neighbours foretell",
-                   lamp["first_target"].get<int>());
 }
 
 void print_report(const TakeReport& report, bool is_estimate, const std::vector<Planned>& planned,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A picture in closed form: a matte bumpy sheet under each lamp, the rows of a basis of it with the camera's noise, and faults of rows.
+// A picture in closed form: a matte bumpy sheet with shadows under each lamp, the rows of a basis of it with the camera's noise, and faults of rows.
 #pragma once
 
 #include <algorithm>
@@ -24,11 +24,12 @@ class LitPicture {
         for (int lamp = 0; lamp < basis.lamps; ++lamp)
             for (size_t p = 0; p < pixels; ++p) {
                 const double x = double(p % width), y = double(p / width);
-                const Vec3 normal =
-                    normalized({std::sin(x / 9) + (x - 40) / 40, std::cos(y / 7) + (y - 30) / 40, 1.2});
+                const Vec3 normal = normalized({std::sin(x / 9) + (x - 40) / 40, std::cos(y / 7) + (y - 30) / 40, 1.2});
                 const double albedo = 0.6 + 0.4 * std::sin(x / 3.1) * std::cos(y / 4.3);
-                lamps[size_t(lamp)][p] =
-                    counts * albedo * std::max(0.0, dot(normal, lights[size_t(lamp)].direction));
+                const Vec3& light = lights[size_t(lamp)].direction;
+                // What stands in its way: shadows that pass over the sheet as lamps change.
+                const double shadow = 0.65 + 0.35 * std::sin(0.5 * (x * light.x + y * light.y) + 9 * light.z);
+                lamps[size_t(lamp)][p] = counts * albedo * shadow * std::max(0.0, dot(normal, light));
             }
     }
 
