@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "demultiplex/row_filler.hpp"
 #include "develop/aligned_rows.hpp"
+#include "develop/target_witnesses.hpp"
 #include "image/target.hpp"
 #include "stage/calibration.hpp"
 #include "stage/sequence.hpp"
@@ -31,6 +33,8 @@ struct DevelopOptions {
     Estimate estimate = Estimate::none;
     std::vector<LightPosition> lamps;  // of the sphere; for an estimate with a prior
     int threads = 0;                   // 0: as many as there are processors. Any number gives the same bits.
+    // Every so manieth column of every so manieth pixel row is looked at by the witnesses (target_witnesses.hpp); 0: there are none.
+    int witness_step = 0;
 };
 
 // The rows of a basis, brought to the target's time.
@@ -51,6 +55,9 @@ struct AlignedFrames {
 // is not solved is 0 under every lamp, or with Estimate::clipped inverted with what its saturated samples read. With a
 // basis that gives each row an image of its own, and no prior, a lost slot is a missing lamp, and a saturated sample
 // stands as it is, a lower bound.
+//
+// With witnesses, targets come in order, each once. A row that is surely named (ParityVerdict) is missing, where the others make up for
+// it, and the target is inverted again without it; its provenance says so ("witness_account").
 class Developer {
   public:
     // References must outlive the developer.
@@ -60,7 +67,9 @@ class Developer {
 
     // Error: slots are missing that the others cannot replace; it names them (`missing_slots`) and says what to do.
     Result<Target> develop(const CycleFrames& frames);
-    Result<Target> develop(const RowFrames& rows, const std::vector<int>& missing_slots);
+    Result<Target> develop(const RowFrames& rows, const std::vector<int>& missing_slots) {
+        return develop(rows, missing_slots, false);
+    }
     // The target has a confidence, and mask_misaligned where it is below trusted_confidence.
     Result<Target> develop(const AlignedFrames& frames, const std::vector<int>& missing_slots);
 
@@ -69,7 +78,10 @@ class Developer {
 
   private:
     template <typename Rows>
-    Result<Target> invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots);
+    Result<Target> invert(const Rows& rows, const Frame& like, const std::vector<int>& missing_slots,
+                          bool stands_still);
+    Result<Target> develop(const RowFrames& rows, const std::vector<int>& missing_slots, bool stands_still);
+    bool makes_up_for(const std::vector<int>& lost_rows);
     bool stands_alone() const;  // every row is an image of its own, and what it lacks is not estimated
     FillCache& fills();         // made when the first sample is masked, by whichever thread meets it
 
@@ -80,6 +92,7 @@ class Developer {
     std::once_flag fills_made_;
     FillModel model_;
     std::unique_ptr<FillCache> fills_;
+    std::optional<TargetWitnesses> witnesses_;
 };
 
 // One cycle, without estimates.

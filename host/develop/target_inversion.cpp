@@ -145,6 +145,7 @@ class BandInversion {
 
     void invert() {
         RowBand<Sum> loaded = load(!job_.fills);
+        if (job_.parity) job_.parity->gather(loaded, band_, job_.noise, shared_.lost_rows);
         for (size_t p = 0; p < band_.samples(); ++p) target_.mask[band_.first_pixel() + p] |= loaded.masked[p];
         for (const int row : target_.missing_lamps) std::fill_n(loaded.row(size_t(row)), band_.samples(), Sum(0));
         prepare_gain();

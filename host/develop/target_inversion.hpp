@@ -7,6 +7,7 @@
 
 #include "demultiplex/row_filler.hpp"
 #include "develop/aligned_rows.hpp"
+#include "develop/parity_samples.hpp"
 #include "develop/row_band.hpp"
 #include "stage/calibration.hpp"
 
@@ -18,7 +19,8 @@ struct InversionJob {
     const NoiseModel& noise;
     std::function<FillCache&()> fills;  // for masked samples; null where they are left as they are
     Estimate estimate = Estimate::none;
-    int threads = 0;  // 0: as many as there are processors. Any number gives the same bits.
+    int threads = 0;                  // 0: as many as there are processors. Any number gives the same bits.
+    ParitySamples* parity = nullptr;  // takes of the rows what lies on its grid; may be null
 };
 
 // Rows: RecordedRows or AlignedRows. `like`: any of the frames. One row at least has a frame.

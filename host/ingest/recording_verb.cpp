@@ -84,6 +84,7 @@ Result<int> run(const Options& options) {
     if (!planned.ok()) return planned.error();
 
     TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
+    take.witness_step = options.take.witness_step;
     take.witnesses = {(*frames)->facts().has_times ? "camera number and time" : "file number", "optical code"};
     std::optional<LineFile> account;
     const TakeSinks sinks = sinks_of(*planned, options.take, account, "ingesting");

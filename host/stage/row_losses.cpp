@@ -26,11 +26,14 @@ Decomposition decompose(const Basis& basis) {
     return decomposition.compute(light);
 }
 
+// The left null space of the levels, orthonormal.
+Eigen::MatrixXd unexplained_by(const Decomposition& decomposition) {
+    return Eigen::MatrixXd(decomposition.householderQ()).rightCols(decomposition.rows() - decomposition.rank());
+}
+
 RowResidual residual_of(const Decomposition& decomposition) {
-    const int redundancy = int(decomposition.rows() - decomposition.rank());
-    const Eigen::MatrixXd unexplained =
-        Eigen::MatrixXd(decomposition.householderQ()).rightCols(redundancy);  // orthonormal, the left null space of P
-    return {unexplained * unexplained.transpose(), redundancy};
+    const Eigen::MatrixXd unexplained = unexplained_by(decomposition);
+    return {unexplained * unexplained.transpose(), int(unexplained.cols())};
 }
 
 RowResidual no_residual(const Basis& basis) {
@@ -48,6 +51,10 @@ bool is_one_image_a_row(const Basis& basis) {
 
 RowResidual row_residual(const Basis& basis) {
     return is_one_image_a_row(basis) ? no_residual(basis) : residual_of(decompose(basis));
+}
+
+Eigen::MatrixXd parity_checks(const Basis& basis) {
+    return unexplained_by(decompose(basis));
 }
 
 RowLosses::RowLosses(const Basis& basis) : residual_(no_residual(basis)) {

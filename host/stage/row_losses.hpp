@@ -26,6 +26,10 @@ struct RowResidual {
 
 RowResidual row_residual(const Basis& basis);
 
+// The parity checks of a basis: sums over the rows, a column each, that are 0 whatever its lamps light. An orthonormal basis of the
+// left null space of the levels, rows x d. Of any basis: also of one whose images are not inverted, as triangles.
+Eigen::MatrixXd parity_checks(const Basis& basis);
+
 // A pivot of (I - H)_MM below this is rounding, as the largest entry is about d / rows: the set M is not solvable.
 constexpr double pivot_least = 1e-9;
 

@@ -65,7 +65,8 @@ Result<int> run(const Options& options) {
     const auto waits = waits_for_arm(options, *watch);
     if (!waits.ok()) return waits.error();
 
-    const TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
+    TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
+    take.witness_step = options.take.witness_step;
     std::optional<LineFile> account;
     nlohmann::json watched;  // of the recording
     TakeSinks sinks = sinks_of(*planned, options.take, account, "recording");

@@ -168,6 +168,11 @@ void TakeOptions::add_to(CLI::App& verb) {
             "so that a glint is about as bright as the camera's white. Estimates are masked; those of a prior have a "
             "bound of their bias")
         ->check(CLI::IsMember(estimate_names()));
+    verb.add_option(
+            "--witness-step", witness_step,
+            "every so manieth pixel in x and in y is looked at for slots that do not fit the others and lamps that "
+            "give less light; 0: none (docs/identity.md has what each step finds and costs)")
+        ->check(CLI::Range(0, 1000));
     verb.add_flag("--overwrite", overwrite, "replace an archive of that name");
     verb.add_flag("--float", single_float, "store 32-bit floats; otherwise half floats");
     verb.add_option("--production", slate.production, "slate: production");

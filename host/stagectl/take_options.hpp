@@ -20,6 +20,7 @@ struct TakeOptions {
     std::string fill = "none", estimate = "none", quality;
     std::vector<std::string> also;  // QUALITY=ARCHIVE
     double fps = 0;
+    int witness_step = TakeDescription{}.witness_step;
     bool nominal = false, overwrite = false, single_float = false, json = false;
 
     void add_to(CLI::App& verb);

@@ -19,6 +19,9 @@ nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
             {"estimated_share", report.estimated_share},
             {"unsolved_share", report.unsolved_share},
             {"misaligned_share", report.misaligned_share},
+            {"suspect_targets", report.suspicion.suspect_targets},
+            {"suspicions", report.suspicion.targets},
+            {"suspect_lamps", report.suspicion.lamps},
             {"seconds",
              {{"develop", report.seconds_develop},
               {"flow", report.seconds_motion.flow},
@@ -38,6 +41,26 @@ nlohmann::json to_json(const TakeReport& report, const std::vector<PlannedArchiv
     return json;
 }
 
+// What the first suspect target and each suspect lamp are suspected of.
+void print_suspicion(const SuspicionReport& suspicion, const std::string& folder) {
+    if (suspicion.suspect_targets > 0) {
+        const nlohmann::json& first = suspicion.targets[0];
+        fmt::print(
+            stderr,
+            "stagectl: {} targets have a slot that does not fit the others (suspect_targets in {}/manifest.json); "
+            "target {} of camera {}: {}{}\n",
+            suspicion.suspect_targets, folder, first["target"].get<int>(), first["camera"].get<int>(),
+            first["says"][0].get<std::string>(),
+            first.contains("taken_as_missing") ? ", and was taken as missing" : "");
+    }
+    for (const auto& [name, lamp] : suspicion.lamps.items())
+        fmt::print(stderr,
+                   "stagectl: {} gave {:.2f} +- {:.2f} of the light that {}, from target {} on: look at the lamp\n",
+                   name, lamp["factor"].get<double>(), lamp["spread"].get<double>(),
+                   lamp["since_first_target"].get<bool>() ? "it gave in the first target" : "its neighbours foretell",
+                   lamp["first_target"].get<int>());
+}
+
 void print_output(const OutputReport& report, const std::string& folder, const TakeOptions& options) {
     if (!options.json)
         fmt::print("{}: {} targets written, {} missing\n", folder, report.targets_written, report.targets_missing);
@@ -49,6 +72,7 @@ void print_output(const OutputReport& report, const std::string& folder, const T
             report.unsolved_share * 100,
             options.estimate == "clipped" ? "" : "--estimate clipped counts saturated ones as they were read, ",
             options.estimate == "clipped" ? "" : " too");
+    print_suspicion(report.suspicion, folder);
     if (report.misaligned_share > 0)
         fmt::print(stderr,
                    "stagectl: motion compensation failed in up to {:.2g} % of a target's pixels, which are masked\n",

@@ -37,9 +37,10 @@ CameraDeveloper::CameraDeveloper(const TakeDescription& take, const TakeTargets&
       is_performance_(targets.every > 0),
       writer_(writer),
       developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
-                 {take.masks.estimate, take.stage.lamps}),
+                 {take.masks.estimate, take.stage.lamps, 0, take.witness_step}),
       motion_developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
-                        {take.masks.estimate, take.stage.lamps}, targets.quality, std::max(targets.every, 1)),
+                        {take.masks.estimate, take.stage.lamps, 0, take.witness_step}, targets.quality,
+                        std::max(targets.every, 1)),
       plan_(plan_targets(take.sequence, take.masks, targets)),
       store_(take.sequence),
       missing_(take.sequence),
@@ -134,7 +135,28 @@ void CameraDeveloper::describe(Target& target, nlohmann::json& detail) {
     detail["unsolved_pixels"] = count(mask_unsolved, target, report_.unsolved_share);
     if (!target.confidence.empty())
         detail["misaligned_pixels"] = count(mask_misaligned, target, report_.misaligned_share);
+    if (const auto witnesses = detail.find("witness_account"); witnesses != detail.end())
+        note_suspicion(target.index, *witnesses);
     target.provenance = detail;
+}
+
+void CameraDeveloper::note_suspicion(uint32_t target, const nlohmann::json& account) {
+    SuspicionReport& report = report_.suspicion;
+    if (account.contains("suspect") && size_t(report.suspect_targets++) < SuspicionReport::targets_max) {
+        nlohmann::json one = {
+            {"camera", camera_}, {"target", target}, {"suspect", account["suspect"]}, {"says", account["says"]}};
+        if (account.contains("taken_as_missing")) one["taken_as_missing"] = account["taken_as_missing"];
+        report.targets.push_back(std::move(one));
+    }
+    if (!account.contains("lamps")) return;
+    for (nlohmann::json lamp : account["lamps"]) {
+        const std::string name = lamp["lamp"];
+        const bool known = report.lamps.contains(name);
+        lamp["first_target"] = known ? report.lamps[name]["first_target"] : nlohmann::json(target);
+        lamp["camera"] = camera_;
+        lamp["last_target"] = target;
+        report.lamps[name] = std::move(lamp);
+    }
 }
 
 }  // namespace ols

@@ -22,6 +22,7 @@ class CameraDeveloper {
         double saturated_share = 0, estimated_share = 0, unsolved_share = 0, misaligned_share = 0;
         double seconds = 0;
         MotionDeveloper::Times seconds_motion;
+        SuspicionReport suspicion;
     };
 
     // `camera`: its place among the stage's. References must outlive the developer.
@@ -56,6 +57,7 @@ class CameraDeveloper {
     Result<Target> develop(const CycleFrames& frames) { return developer_.develop(frames); }
     Result<Target> develop(const TargetFrames& frames) { return motion_developer_.develop(frames); }
     void describe(Target& target, nlohmann::json& detail);
+    void note_suspicion(uint32_t target, const nlohmann::json& witnesses);
 
     const TakeDescription& take_;
     const uint32_t camera_;

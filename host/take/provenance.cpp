@@ -113,13 +113,16 @@ nlohmann::json origin_of(const RecordedFrames& frames, const RecordingPlace& pla
 }
 
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const nlohmann::json& origin,
-                             const RecordReport& record, const std::vector<nlohmann::json>& missing) {
+                             const RecordReport& record, const std::vector<nlohmann::json>& missing,
+                             const SuspicionReport& suspicion) {
     nlohmann::json identification = record_json(record);
     for (size_t n = 0; n < missing.size(); ++n) identification["cameras"][n]["missing"] = missing[n];
     nlohmann::json json = {{"sequence", describe_sequence(take.sequence)},
                            {"calibration", take.calibration.source},
                            {"identification", std::move(identification)}};
     json.update(origin);
+    if (!suspicion.targets.is_null()) json["suspect_targets"] = suspicion.targets;
+    if (!suspicion.lamps.is_null()) json["suspect_lamps"] = suspicion.lamps;
     if (targets.every > 0) json["motion"] = describe_motion(take.sequence, targets);
     return json;
 }

@@ -20,6 +20,7 @@ nlohmann::json origin_of(const Board& board);
 // Of the take, for the manifest's `extra`. `origin`: origin_of(). `missing`: one account (missing_ranges.hpp) for each of
 // the record's cameras.
 nlohmann::json describe_take(const TakeDescription& take, const TakeTargets& targets, const nlohmann::json& origin,
-                             const RecordReport& record, const std::vector<nlohmann::json>& missing);
+                             const RecordReport& record, const std::vector<nlohmann::json>& missing,
+                             const SuspicionReport& suspicion);
 
 }  // namespace ols

@@ -57,6 +57,7 @@ class Output {
             report.estimated_share = std::max(report.estimated_share, developed.estimated_share);
             report.unsolved_share = std::max(report.unsolved_share, developed.unsolved_share);
             report.misaligned_share = std::max(report.misaligned_share, developed.misaligned_share);
+            report.suspicion.add(developed.suspicion);
             report.seconds_develop += developed.seconds;
             report.seconds_motion.flow += developed.seconds_motion.flow;
             report.seconds_motion.planes += developed.seconds_motion.planes;
@@ -74,8 +75,12 @@ class Output {
     Status finish(const TakeDescription& take, const nlohmann::json& origin, const RecordReport& record,
                   const nlohmann::json& account) {
         std::vector<nlohmann::json> missing;
-        for (const CameraDeveloper& developer : developers_) missing.push_back(developer.missing_json());
-        archive_.add_to_manifest(describe_take(take, targets_, origin, record, missing));
+        SuspicionReport suspicion;
+        for (CameraDeveloper& developer : developers_) {
+            missing.push_back(developer.missing_json());
+            suspicion.add(developer.finish().suspicion);
+        }
+        archive_.add_to_manifest(describe_take(take, targets_, origin, record, missing, suspicion));
         archive_.add_to_manifest(account);
         return archive_.finish();
     }
@@ -131,6 +136,14 @@ Error nothing_came(const RecordReport& record) {
 }
 
 }  // namespace
+
+void SuspicionReport::add(const SuspicionReport& other) {
+    suspect_targets += other.suspect_targets;
+    for (const nlohmann::json& target : other.targets)
+        if (targets.size() < targets_max) targets.push_back(target);
+    for (const auto& [name, lamp] : other.lamps.items())
+        if (!lamps.contains(name)) lamps[name] = lamp;
+}
 
 std::optional<double> measured_black(const Calibration& calibration, size_t camera) {
     if (calibration.source == "nominal") return std::nullopt;

@@ -39,6 +39,7 @@ struct TakeDescription {
     Calibration calibration;  // of the stage's cameras, in their order
     TakeMasks masks;
     std::vector<std::string> witnesses = {"board log", "camera id and time", "optical code"};  // that every frame has
+    int witness_step = 5;  // DevelopOptions::witness_step
 };
 
 // What it is recorded with.
@@ -64,6 +65,18 @@ struct TakeSinks {
         account;  // of what else watched the stage, for the manifest: asked once it is recorded
 };
 
+// What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).
+struct SuspicionReport {
+    int suspect_targets = 0;  // of which a slot is suspect
+    nlohmann::json targets;   // of the first of these: "camera", "target", "suspect", "says", "taken_as_missing"
+    nlohmann::json
+        lamps;  // by lamp, as in the last target that named it, with "camera", "first_target" and "last_target"
+    static constexpr size_t targets_max = 100;  // that are listed
+
+    // Of another camera; of a lamp that both name the first one's stays.
+    void add(const SuspicionReport& other);
+};
+
 // Of one archive.
 struct OutputReport {
     int targets_written = 0, targets_missing = 0;
@@ -73,6 +86,7 @@ struct OutputReport {
     double seconds_develop = 0, seconds_write = 0;  // busy in each thread
     MotionDeveloper::Times seconds_motion;          // parts of seconds_develop, of a performance
     std::string write_error;                        // what could not be written first, and why; empty when all was
+    SuspicionReport suspicion;
 };
 
 struct TakeReport {

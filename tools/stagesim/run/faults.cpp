@@ -25,7 +25,16 @@ Result<std::vector<Fault>> read_faults(const std::string& path) {
                                         {"swap", FaultKind::swap},
                                         {"wrong_size", FaultKind::wrong_size},
                                         {"freeze", FaultKind::freeze},
+                                        {"swap_pictures", FaultKind::swap_pictures},
+                                        {"old_light", FaultKind::old_light},
+                                        {"dim_lamp", FaultKind::dim_lamp},
                                         {"restart_camera", FaultKind::restart_camera}});
+        int lamp = 0, count = 0;
+        section.read("lamp", lamp, 0, 65535);
+        section.read("factor", fault.factor, 0.0, 1.0);
+        section.read("count", count, 1, 1 << 30);
+        fault.lamp = size_t(lamp);
+        if (count > 0) fault.count = uint64_t(count);
         section.read("camera", camera, 0, 3);
         section.read("trigger", trigger, 0, 1 << 30);
         section.read("by", by, 1, 1 << 20);
@@ -48,6 +57,20 @@ const Fault* FaultyDelivery::find(FaultKind kind, uint64_t trigger) const {
     return nullptr;
 }
 
+void FaultyDelivery::dim(std::vector<double>& lit_us, uint64_t trigger) {
+    for (const Fault& fault : faults_)
+        if (fault.kind == FaultKind::dim_lamp && fault.lamp < lit_us.size() && trigger >= fault.trigger &&
+            trigger - fault.trigger < fault.count)
+            lit_us[fault.lamp] *= fault.factor;
+    constexpr size_t kept = 1024;
+    const std::vector<double> own = lit_us;
+    if (const Fault* old = find(FaultKind::old_light, trigger); old && old->by <= lit_before_.size())
+        lit_us = lit_before_[size_t(old->by - 1)];
+    if (faults_.empty()) return;
+    lit_before_.push_front(own);
+    if (lit_before_.size() > kept) lit_before_.pop_back();
+}
+
 void FaultyDelivery::send(Frame frame, uint64_t trigger, const std::function<void(Frame)>& deliver) {
     if (strikes(FaultKind::drop_frame, trigger)) return;
     const std::vector<std::byte> fresh = frame.samples;
@@ -56,6 +79,15 @@ void FaultyDelivery::send(Frame frame, uint64_t trigger, const std::function<voi
     if (strikes(FaultKind::wrong_size, trigger)) {
         frame.height -= 2;
         frame.samples.resize(size_t(frame.height) * frame.pitch_bytes);
+    }
+    if (const Fault* swapped = find(FaultKind::swap_pictures, trigger)) {
+        waiting_.emplace(trigger + swapped->by, std::move(frame));
+        return;
+    }
+    if (const auto waiting = waiting_.find(trigger); waiting != waiting_.end()) {
+        std::swap(waiting->second.samples, frame.samples);
+        pass(std::move(waiting->second), deliver);
+        waiting_.erase(waiting);
     }
     if (const Fault* late = find(FaultKind::late, trigger)) {
         held_.push_back({std::move(frame), late->by});
@@ -80,6 +112,8 @@ void FaultyDelivery::pass(Frame frame, const std::function<void(Frame)>& deliver
 }
 
 void FaultyDelivery::finish(const std::function<void(Frame)>& deliver) {
+    for (auto& [trigger, frame] : waiting_) deliver(std::move(frame));
+    waiting_.clear();
     for (Held& held : held_) deliver(std::move(held.frame));
     held_.clear();
 }

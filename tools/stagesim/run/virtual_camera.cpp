@@ -70,10 +70,11 @@ void VirtualCamera::expose(const ExposureMessage& message) {
         next_frame_id_ = 1;
         if (!restart->keep_clock) clock_epoch_tick_ = message.rise, clock_.offset_ns = 0;
     }
+    std::vector<double> lit_us = lit_microseconds(message, setup_.stage);
+    delivery_.dim(lit_us, trigger);
     if (delivery_.strikes(FaultKind::drop_trigger, trigger)) return;
 
     const CameraStamp stamp{next_frame_id_++, time_ns(message.rise)};
-    const std::vector<double> lit_us = lit_microseconds(message, setup_.stage);
     write_truth(stamp, trigger, message.rise, lit_us);
     if (!ring_.wanted()) {
         ++unwanted_;
