@@ -118,7 +118,6 @@ def test_a_lost_frame_masks_its_group_and_nothing_else(live, timed):
     missing = identification(archive)["cameras"][0]["missing"]
     triggers = {t for r in missing for t in range(r["first_trigger"], r["first_trigger"] + r["count"])}
     assert triggers == set(range(5 * 18, 6 * 18)) and report["causes"] == {"no_frame": 1, "not_proved": 17}
-    live.expect_same(archive, first=2, count=1) if False else None
     for index in (1, 2):
         assert np.array_equal(read_lamps(archive, index), read_lamps(live.archive, index + 1))
 
@@ -134,7 +133,8 @@ def test_a_loss_that_no_number_tells_of_is_found_by_the_code_and_costs_up_to_the
         assert kept[frame["frame_id"]] - CYCLE == frame["cycle"] * CYCLE + frame["slot"], frame
     # All but what lies between the landmarks around the loss; a new lock costs nothing more.
     placed = {frame["cycle"] * CYCLE + frame["slot"] for frame in account}
-    missing = set(range((CYCLES - 1) * CYCLE)) - placed
+    # (The files end with the last cycle, which by their count is one frame short, and so no whole one.)
+    missing = set(range((CYCLES - 2) * CYCLE)) - placed
     assert lost - CYCLE in missing and min(missing) >= 5 * 18 and max(missing) < 7 * 18, sorted(missing)
     assert np.array_equal(read_lamps(archive, 1), read_lamps(live.archive, 2))
 
