@@ -61,8 +61,8 @@ struct TakeSinks {
     std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
     std::function<void(const Frame&)> identified;                    // every frame that has its slot; one at a time
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
-    std::function<nlohmann::json()>
-        account;  // of what else watched the stage, for the manifest: asked once it is recorded
+    // Of what else watched the stage, for the manifest: asked once it is recorded.
+    std::function<nlohmann::json()> account = {};
 };
 
 // What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).

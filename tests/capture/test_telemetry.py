@@ -19,7 +19,7 @@ def record(tmp_path, *options, code):
 
 def test_a_whole_take_has_every_nodes_extremes(tmp_path):
     report, manifest = record(tmp_path, code=0)
-    assert report["stopped_by"] == manifest["stopped_by"] == ""
+    assert report["board_end"] is None and "board_end" not in manifest["identification"]
     assert report["lamp_nodes"] == manifest["lamp_nodes"] and len(manifest["lamp_nodes"]) == 11
     for node in manifest["lamp_nodes"][:9]:
         assert node["frames"] >= 5 and node["frames_lost"] == node["faults"] == 0
@@ -30,9 +30,9 @@ def test_a_whole_take_has_every_nodes_extremes(tmp_path):
 
 def test_a_node_that_gets_hot_ends_the_take_and_what_was_proved_is_kept(tmp_path):
     report, manifest = record(tmp_path, "--board-inject", f"lampfault:3:1@trigger:{20 * CYCLE}", code=2)
-    for told in (report, manifest):
-        assert told["stopped_by"].startswith("lamp node 3 reports over-temperature") and "95.0 C" in told["stopped_by"]
-        assert "the lamps 48-63" in told["stopped_by"]
+    for told, end in ((report, report["board_end"]), (manifest, manifest["identification"]["board_end"])):
+        assert end["cause"] == "stopped" and end["why"].startswith("lamp node 3 reports over-temperature"), end
+        assert "95.0 C" in end["why"] and "the lamps 48-63" in end["why"]
         assert told["lamp_nodes"][3]["faults"] == 1 and told["lamp_nodes"][3]["temperature_c"][1] == 95
     assert 19 <= report["targets_written"] < CYCLES
     assert report["targets_written"] + report["targets_missing"] == CYCLES
