@@ -5,7 +5,7 @@ import subprocess
 
 import numpy as np
 
-from virtual_take import BIN, VirtualStage, identification, read_lamps, read_plane, sequence, target_file
+from virtual_take import BIN, VirtualStage, read_lamps, read_plane
 
 
 class Bridge:
@@ -26,9 +26,11 @@ class Bridge:
 
 
 def take(stage, archive, camera):
-    return stage.stagectl(
-        "run", "--sequence", sequence("s159"), "--cycles", 1, "--nominal", "-o", archive, "--json", camera=camera
-    )
+    # The card is brighter than skin, which the examples' exposures are for.
+    sequence = stage.folder / "sequence.toml"
+    sequence.write_text('basis = "s159"\ncycles = 1\nexposure_us = { basis = 50, tracking = 20 }\n')
+    options = ["--sequence", sequence, "--nominal", "--patience", 200, "-o", archive, "--json"]
+    return stage.stagectl("run", *options, camera=camera)
 
 
 def features(address):
@@ -51,13 +53,13 @@ def test_a_take_over_gige_vision_is_that_of_the_ring_bit_for_bit(tmp_path):
         report = take(stage, gige, f"aravis:{bridge.address}")
         seen = features(bridge.address)  # as the take left it
     assert report["slots_missing"] == 0
+    (camera,) = report["cameras"]
+    assert (camera["frames"], camera["missing_ids"], camera["underrun"]) == (180, 0, 0), camera
+    assert camera["link"].startswith("GigE Vision, " + seen["PixelFormat"]), camera
     assert seen["Width"] == "64" and seen["Height"] == "48", seen
     assert seen["PixelFormat"] in ("BayerRG12p", "BayerRG12Packed"), seen
     assert seen["TriggerMode"] == "On", seen
-    for target in range(1):
-        for channel in "RGB":
-            assert np.array_equal(read_lamps(ring, target, channel), read_lamps(gige, target, channel))
-        assert np.array_equal(read_plane(ring, target, "mask"), read_plane(gige, target, "mask"))
-    assert not target_file(gige, 1).exists()
-    account = identification(gige)
-    assert "GigE Vision" in str(account), account
+    mask = read_plane(ring, 0, "mask")
+    assert np.array_equal(mask, read_plane(gige, 0, "mask")) and np.mean(mask == 0) > 0.9
+    lamps = read_lamps(ring, 0)
+    assert np.array_equal(lamps, read_lamps(gige, 0)) and np.abs(lamps).max() > 0.1
