@@ -247,7 +247,8 @@ class HeaderReader {
             const uint64_t offset = field<uint64_t>(*table, 8 * i);
             if (offset < cine_bytes || offset > size_ || size_ - offset < header_.image_bytes() + 8)
                 return damaged(
-                    fmt::format("image {} of {} at byte {} lies outside of it ({} bytes)", i, images_, offset, size_));
+                    fmt::format("image {} of {} at byte {} lies outside of its {} bytes, or it was cut short", i,
+                                images_, offset, size_));
             header_.offsets.push_back(offset);
             facts.numbers.push_back(first_image_ + int64_t(i));
         }
