@@ -145,7 +145,10 @@ void CameraDeveloper::note_suspicion(uint32_t target, const nlohmann::json& acco
     if (account.contains("suspect") && size_t(report.suspect_targets++) < SuspicionReport::targets_max) {
         nlohmann::json one = {
             {"camera", camera_}, {"target", target}, {"suspect", account["suspect"]}, {"says", account["says"]}};
-        if (account.contains("taken_as_missing")) one["taken_as_missing"] = account["taken_as_missing"];
+        if (account.contains("taken_as_missing")) {
+            one["taken_as_missing"] = account["taken_as_missing"];
+            one["cause"] = cause_name(Cause::swapped);
+        }
         report.targets.push_back(std::move(one));
     }
     if (!account.contains("lamps")) return;

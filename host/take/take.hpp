@@ -68,9 +68,10 @@ struct TakeSinks {
 // What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).
 struct SuspicionReport {
     int suspect_targets = 0;  // of which a slot is suspect
-    nlohmann::json targets;   // of the first of these: "camera", "target", "suspect", "says", "taken_as_missing"
-    nlohmann::json
-        lamps;  // by lamp, as in the last target that named it, with "camera", "first_target" and "last_target"
+    // Of the first of these: "camera", "target", "suspect", "says"; where slots were "taken_as_missing", which, and the "cause".
+    nlohmann::json targets;
+    // By lamp, as in the last target that named it, with "camera", "first_target" and "last_target".
+    nlohmann::json lamps;
     static constexpr size_t targets_max = 100;  // that are listed
 
     // Of another camera; of a lamp that both name the first one's stays.
