@@ -37,8 +37,14 @@ class Reading : public testing::Test {
         while (reader_->drops() < count) std::this_thread::yield();
     }
 
+    static FakeOptions options() {
+        FakeOptions options;
+        options.room = room;
+        return options;
+    }
+
     CameraConfig config_;
-    FakeCamera camera_{{.room = room}};
+    FakeCamera camera_{options()};
     std::atomic<bool> disk_is_late_ = false;
     RecordQueue queue_{SIZE_MAX};
     std::optional<CameraReader> reader_;
