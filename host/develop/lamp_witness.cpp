@@ -57,12 +57,14 @@ LampWitness::Found LampWitness::find(const Eigen::VectorXd& values, std::vector<
                                      const Eigen::VectorXd& noise) const {
     const size_t unknown_count = unknown.size();
     std::vector<int>& left_out = unknown;
+    // With all lamps in: an edge of light (a flat subject's) is foretold too dark on one side as it is too bright on the other, and what is
+    // left out on one takes that on the other away.
+    double most_above = 0;
     for (;;) {
         const Eigen::VectorXd foretold = foretell(values, left_out);
         const Eigen::VectorXd off = (values - foretold).cwiseQuotient(noise);
         std::vector<double> sizes;
         int weakest = -1;
-        double most_above = 0;
         for (int image = 0; image < basis_.images(); ++image) {
             if (has(left_out, image)) continue;
             sizes.push_back(std::abs(off(image)));

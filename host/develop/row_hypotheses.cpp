@@ -13,7 +13,9 @@ namespace {
 
 // A candidate whose evidence is less than the best one's by more than so many of its deviations is ruled out.
 constexpr double rival_sigma = 4;
-constexpr size_t candidates_max = 40;
+// With more pairs than that left, pairs of this subject are not told apart: of a flat one, which looks the same in all rows but for its
+// brightness, what motion leaves fits dozens.
+constexpr size_t pairs_max = 8;
 
 // Vectors N_k that are parallel to this share of their length are one direction.
 constexpr double parallel = 1e-6;
@@ -134,7 +136,7 @@ std::optional<RowFinding> find_copied(const ParityEvidence& evidence) {
             for (size_t p = 0; p < pairs.size(); ++p)
                 if (pairs[p].i != pair.i && pairs[p].i != pair.j && pairs[p].j != pair.i && pairs[p].j != pair.j)
                     next = std::min(next, excess[p]);
-            if (run.noise == 0 || excess[least] + rival_sigma * deviation > next / 2) continue;
+            if (run.noise == 0 || std::max(excess[least], 0.0) + rival_sigma * deviation > next / 2) continue;
 
             // Which of the two: e |N_k|^2 lies along N_k, and only its share cos^2 along the other's.
             const Eigen::VectorXd a = evidence.checks.row(pair.i), b = evidence.checks.row(pair.j);
@@ -201,9 +203,9 @@ std::optional<RowFinding> find_swapped(const ParityEvidence& evidence) {
     RowFinding finding{
         RowFault::swapped, {}, -1, best.sigma / spread, double(best.last - best.first + 1) / double(count)};
     for (const Candidate& one : candidates)
-        if (finding.candidates.size() < candidates_max &&
-            best.evidence - one.evidence <= rival_sigma * spread * best.deviation / 2)
+        if (best.evidence - one.evidence <= rival_sigma * spread * best.deviation / 2)
             finding.candidates.push_back({one.pair.i, one.pair.j});
+    if (finding.candidates.size() > pairs_max) return {};
     return finding;
 }
 
