@@ -18,28 +18,25 @@ namespace {
 constexpr double residual_share = 0.3;
 
 StripSums sums_of(const ParitySamples& samples, const std::vector<Eigen::Index>& strip, const Eigen::MatrixXd& checks) {
-    const Eigen::Index rows = samples.counts().rows(), d = checks.cols();
+    const Eigen::Index rows = samples.counts().rows();
     StripSums sums;
     sums.samples = strip.size();
     sums.rows = Eigen::MatrixXf::Zero(rows, rows);
-    sums.mean_rows = Eigen::VectorXd::Zero(rows);
-    sums.check_rows = Eigen::MatrixXd::Zero(d, rows);
-    sums.checks = Eigen::MatrixXd::Zero(d, d);
-    Eigen::MatrixXf centred(rows, Eigen::Index(strip.size()));
-    for (size_t k = 0; k < strip.size(); ++k) {
-        const Eigen::VectorXd counts = samples.counts().col(strip[k]).cast<double>();
-        const double variance = double(samples.variance()(strip[k])), mean = counts.mean();
-        const Eigen::VectorXd z = checks.transpose() * counts;
-        const double weight = 1 / (variance + residual_share * z.squaredNorm() / double(d));
-        const Eigen::VectorXd off = counts.array() - mean;
-        centred.col(Eigen::Index(k)) = (std::sqrt(weight) * off).cast<float>();
-        sums.mean_rows += weight * mean * off;
-        sums.mean_square += weight * mean * mean;
-        sums.check_rows.noalias() += weight * z * counts.transpose();
-        sums.checks.noalias() += weight * z * z.transpose();
-        sums.noise += weight * variance;
-        sums.chi_square += z.squaredNorm() / variance;
-    }
+    const Eigen::MatrixXd counts = samples.counts()(Eigen::all, strip).cast<double>();
+    const Eigen::ArrayXd variance = samples.variance()(strip).cast<double>();
+    const Eigen::MatrixXd z = checks.transpose() * counts;
+    const Eigen::ArrayXd squares = z.colwise().squaredNorm().array();
+    const Eigen::ArrayXd weights = (variance + squares * (residual_share / double(checks.cols()))).inverse();
+    const Eigen::MatrixXd weighted = z * weights.matrix().asDiagonal();
+    sums.check_rows = weighted * counts.transpose();
+    sums.checks = weighted * z.transpose();
+    sums.noise = (weights * variance).sum();
+    sums.chi_square = (squares / variance).sum();
+    const Eigen::RowVectorXd means = counts.colwise().mean();
+    sums.mean_square = (weights * means.transpose().array().square()).sum();
+    const Eigen::MatrixXd off = counts.rowwise() - means;
+    sums.mean_rows = off * (weights * means.transpose().array()).matrix();
+    const Eigen::MatrixXf centred = (off * weights.sqrt().matrix().asDiagonal()).cast<float>();
     if (!strip.empty())
         cblas_ssyrk(CblasColMajor, CblasLower, CblasNoTrans, int(rows), int(strip.size()), 1, centred.data(), int(rows),
                     0, sums.rows.data(), int(rows));
