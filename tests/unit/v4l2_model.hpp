@@ -67,7 +67,8 @@ class V4l2Model : public V4l2Device {
         Buffer& buffer = buffers_[index];
         buffer.is_queued = false;
         std::fill(buffer.memory.begin(), buffer.memory.end(), std::byte{0});
-        std::memcpy(buffer.memory.data(), exposure.bytes.data(), std::min(exposure.bytes.size(), buffer.memory.size()));
+        std::copy_n(exposure.bytes.begin(), std::min(exposure.bytes.size(), buffer.memory.size()),
+                    buffer.memory.begin());
         buffer.bytesused = uint32_t(format_.sizeimage - exposure.bytes_short);
         buffer.sequence = sequence;
         buffer.flags = exposure.flags;
