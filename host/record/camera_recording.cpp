@@ -150,10 +150,12 @@ void CameraRecording::hand_on() {
         const auto found = frames_.find(verdict.arrival);
         const std::shared_ptr<Frame> frame = std::move(found->second);
         frames_.erase(found);
-        if (verdict.kind == Verdict::discarded)
+        if (verdict.kind == Verdict::discarded) {
             ++report_.frames_discarded;
-        else
+            report_.discarded.add(verdict.why.cause);
+        } else {
             identified(frame, verdict.entry);
+        }
     }
     sink_.progress(identifier_.decided(), slots_total_);
 }

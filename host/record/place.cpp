@@ -63,6 +63,7 @@ void FramePlacer::end() {
 }
 
 void FramePlacer::process(FrameWitness frame) {
+    has_seen_light_ = has_seen_light_ || !frame.unfit.empty() || !is_dark(frame.summary);
     if (!grid_) return begin_stretch(std::move(frame), {Cause::no_frame, "before the camera's first frame"});
     if (append(frame)) {
         if (stray_) refuse(*stray_, off_grid);
@@ -188,10 +189,7 @@ void FramePlacer::try_lock() {
 
 // Of the frames of a stretch that has no place.
 Reason FramePlacer::nothing_fits() const {
-    const auto shows_light = [](const Pending& pending) {
-        return !pending.frame.unfit.empty() || !is_dark(pending.frame.summary);
-    };
-    if (std::ranges::any_of(unlocked_, shows_light)) return {Cause::not_proved, "no place in the cycle fits it"};
+    if (has_seen_light_) return {Cause::not_proved, "no place in the cycle fits it"};
     return {Cause::no_light, "no frame shows any light: check the lamps' supply, the lens and its cap"};
 }
 

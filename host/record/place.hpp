@@ -113,6 +113,7 @@ class FramePlacer {
     uint64_t bound_arrivals_ = 0, bound_fired_ = 0;  // the last bound, for frames that are still on their way here
     std::vector<Placement> placements_;
     uint64_t duplicates_ = 0, camera_restarts_ = 0;
+    bool has_seen_light_ = false;               // in any frame, or in one that cannot be looked at
     uint64_t disk_drops_ = 0, host_drops_ = 0;  // of those that frames told of, how many a gap was found for
 
     // The stretch.

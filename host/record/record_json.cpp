@@ -27,7 +27,6 @@ nlohmann::json camera_json(const CameraReport& report) {
             {"unfit_frame", report.unfit_frame},
             {"slots_missing", report.missing.total()},
             {"causes", report.missing.to_json()},
-            {"clock", report.clock ? clock_record(*report.clock) : nlohmann::json()},
             {"end", end_json(report.end)}};
 }
 

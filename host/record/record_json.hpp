@@ -9,7 +9,7 @@
 namespace ols {
 
 // {"slots_total", "slots_missing", "causes", "board_end", "cameras": [{"name", "link", what became of its frames by count, "causes",
-// "clock", "end"}]}. Of this machine's clock, which no two takes have alike, nothing.
+// "end"}]}. Of clocks, which no two takes have alike, nothing.
 nlohmann::json record_json(const RecordReport& report);
 
 }  // namespace ols

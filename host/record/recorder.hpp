@@ -47,6 +47,7 @@ struct CameraReport {
     uint64_t stale_buffers = 0;          // frames with the samples of an earlier one, bit for bit
     uint64_t frames_without_noise = 0;   // frames of which that cannot be told (frame_bits.hpp)
     CauseCounts missing;                 // slots, by cause
+    CauseCounts discarded;               // frames that came and are no slot's
     std::optional<ClockRelation> clock;  // its own, of the identified frames
     std::string unfit_frame;  // the first frame that was not of the stage's size or format; empty when there was none
     Reason end;               // why it gave no more before it had delivered everything; empty when it had

@@ -35,6 +35,8 @@ nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
 nlohmann::json to_json(const TakeReport& report, const std::vector<PlannedArchive>& planned) {
     nlohmann::json json = to_json(report.outputs[0], planned[0].path);
     json.update(record_json(report.record));
+    for (size_t n = 0; n < report.record.cameras.size(); ++n)
+        if (const auto& clock = report.record.cameras[n].clock) json["cameras"][n]["clock"] = clock_record(*clock);
     json["host_clock"] = report.record.host_clock ? clock_record(*report.record.host_clock) : nlohmann::json();
     json["seconds"]["total"] = report.seconds_total;
     for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));

@@ -123,7 +123,7 @@ Error nothing_came(const RecordReport& record) {
         if (!camera.unfit_frame.empty())
             why +=
                 fmt::format(": frames came as {}, which is not what the stage says of its camera", camera.unfit_frame);
-        else if (camera.missing.of(Cause::no_light) > 0)
+        else if (camera.discarded.of(Cause::no_light) > 0)
             why +=
                 fmt::format(": {} frames came, and none shows any light: check the lamps' supply, the lens and its cap",
                             camera.frames);

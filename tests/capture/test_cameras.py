@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from virtual_take import BIN, SMALL_STAGE, VirtualStage, identification, missing_slots, missing_triggers, read_lamps, sequence
+from virtual_take import BIN, SMALL_STAGE, VirtualStage, missing_slots, missing_triggers, read_lamps, sequence
 
 CYCLE, CYCLES = 180, 2
 # Without noise, whose generator is keyed by the camera's number; from the side, of another size, on a trigger line of its own.
@@ -55,7 +55,7 @@ def test_each_camera_comes_out_as_it_does_alone_and_every_tool_finds_it(tmp_path
     for camera in (0, 1):
         for index in range(CYCLES):
             assert np.array_equal(read_lamps(archive, index, camera=camera), alone[camera][index]), (camera, index)
-    for camera in identification(archive)["cameras"]:
+    for camera in report["cameras"]:
         assert camera["frames"] == CYCLES * CYCLE and camera["slots_missing"] == 0
         # The virtual camera's clock is the board's, to the nanosecond.
         clock = camera["clock"]
