@@ -192,9 +192,9 @@ int main(int argc, char** argv) {
                           "aligned: whole "
                           "frames and torn ones, of which so much of the height differs. Times are of the still target "
                           "at 640 x 480, inversion and all, which has four times as many samples at a step.",
-                 .advice = "The default finds pictures that changed places in nearly all takes for a few milliseconds "
-                           "a target. A lamp that "
-                           "misses one slot needs all samples, and is less than noise in every image."});
+                 .advice = "The default finds pictures that changed places in nearly all takes of a subject that holds "
+                           "still, for about half of the time of its inversion. A lamp that misses one slot needs all "
+                           "samples, and is less than noise in every image."});
     const std::string folder = bench.full() ? "out/bench/motion" : "";
     const int width = bench.full() ? 320 : 48, height = bench.full() ? 240 : 32, count = bench.full() ? 12 : 1;
     const std::vector<std::string> subjects = {"still", "talk", "turn60"};
