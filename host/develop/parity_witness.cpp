@@ -45,8 +45,7 @@ const char* row_fault_name(RowFault fault) {
     switch (fault) {
         case RowFault::swapped: return "swapped";
         case RowFault::copied: return "copied";
-        case RowFault::lamp_out: return "lamp out";
-        case RowFault::lamp_on: return "lamp on";
+        case RowFault::mislit: return "mislit";
         case RowFault::changed: return "changed";
     }
     return "";

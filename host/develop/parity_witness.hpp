@@ -28,10 +28,9 @@
 namespace ols {
 
 enum class RowFault {
-    swapped,   // two rows have each other's picture
-    copied,    // a row has another's picture
-    lamp_out,  // a lamp did not light in one row
-    lamp_on,   // a lamp did light in one row that is not in its pattern
+    swapped,  // two rows have each other's picture
+    copied,   // a row has another's picture
+    mislit,   // a lamp was out, or on, against the pattern in one row
     changed,  // a row looks other than in the target before, while the others do not, of a subject that stands still: one of the two is wrong
 };
 const char* row_fault_name(RowFault fault);
@@ -40,7 +39,7 @@ struct RowFinding {
     RowFault fault;
     // What fits about equally well, best first: a pair if swapped; else a row each. One: it is named surely.
     std::vector<std::vector<int>> candidates;
-    int lamp = -1;     // of lamp_out and lamp_on
+    int lamp = -1;     // of mislit
     double sigma = 0;  // how far from what chance gives
     double share = 1;  // of the picture's height that differs
 };

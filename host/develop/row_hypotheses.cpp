@@ -210,7 +210,7 @@ std::optional<RowFinding> find_swapped(const ParityEvidence& evidence) {
 }
 
 // x_l = W_l y; with u a direction of N: A = sum w x_l u'z, S = sum w x_l^2, and A = -u^2 S where the lamp was out in a row with N_k = u. Rows whose
-// N_k is u and that light the lamp are not told apart, nor are those with N_k = -u that do not.
+// N_k is u and that light the lamp are not told apart, nor from them those with N_k = -u that do not and in which it was on.
 std::optional<RowFinding> find_mislit(const ParityEvidence& evidence) {
     if (evidence.inverse.size() == 0) return {};
     const Eigen::Index rows = evidence.checks.rows(), lamps = evidence.inverse.rows();
@@ -267,20 +267,17 @@ std::optional<RowFinding> find_mislit(const ParityEvidence& evidence) {
     const double least = normal_quantile(ParityWitness::false_alarms / (2 * double(sigmas.size())));
     // A factor of 1, to a half: less is explained better by no fault, more by something else than this lamp.
     if (std::abs(best.sigma) / spread < least || std::abs(std::abs(best.factor) - 1) > 0.5) return {};
-    RowFinding out{
-        RowFault::lamp_out, {}, evidence.basis.image_lamps[size_t(best.lamp)][0], std::abs(best.sigma) / spread, 1};
-    RowFinding on = out;
-    on.fault = RowFault::lamp_on;
+    RowFinding finding{
+        RowFault::mislit, {}, evidence.basis.image_lamps[size_t(best.lamp)][0], std::abs(best.sigma) / spread, 1};
     const Eigen::VectorXd& u = directions[best.direction];
     for (Eigen::Index row = 0; row < rows; ++row) {
         const Eigen::VectorXd own = evidence.checks.row(row);
         const int sign = (own - u).norm() < parallel * u.norm() ? 1 : (own + u).norm() < parallel * u.norm() ? -1 : 0;
-        if (sign == 0) continue;
         const bool is_out = sign * best.factor < 0;
-        if (is_out == evidence.basis.lit(int(row), out.lamp)) (is_out ? out : on).candidates.push_back({int(row)});
+        if (sign != 0 && is_out == evidence.basis.lit(int(row), finding.lamp)) finding.candidates.push_back({int(row)});
     }
-    if (out.candidates.empty() && on.candidates.empty()) return {};
-    return on.candidates.empty() || !out.candidates.empty() ? std::move(out) : std::move(on);
+    if (finding.candidates.empty()) return {};
+    return finding;
 }
 
 }  // namespace ols

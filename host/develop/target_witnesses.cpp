@@ -56,8 +56,9 @@ std::string TargetWitnesses::say(const RowFinding& finding) const {
             where += names.size() == 1 ? " show each other's picture" : " shows each other's picture";
             break;
         case RowFault::copied: where += " shows another slot's picture"; break;
-        case RowFault::lamp_out: where = lamp_name(finding.lamp) + " did not light in " + where; break;
-        case RowFault::lamp_on: where = lamp_name(finding.lamp) + " did light, against the pattern, in " + where; break;
+        case RowFault::mislit:
+            where = lamp_name(finding.lamp) + " was out, or on, against the pattern in " + where;
+            break;
         case RowFault::changed: where += " looks other than in the target before, while the others do not"; break;
     }
     if (finding.share < 1) where += fmt::format(", in {:.0f} % of the frame's height", 100 * finding.share);

@@ -155,7 +155,7 @@ TEST(ParityWitness, a_lamp_that_missed_one_row_is_named_and_its_row_among_others
     for (size_t p = 0; p < LitPicture::pixels; ++p) means[size_t(row)][p] -= picture.lamps[size_t(lamp)][p];
     const ParityVerdict verdict = verdict_of(witness, picture.samples(LitPicture::exposed(means, 8)));
     ASSERT_TRUE(verdict.finding.has_value());
-    EXPECT_EQ(verdict.finding->fault, RowFault::lamp_out);
+    EXPECT_EQ(verdict.finding->fault, RowFault::mislit);
     EXPECT_EQ(verdict.finding->lamp, lamp);
     EXPECT_NE(std::ranges::find(verdict.finding->candidates, std::vector<int>{row}), verdict.finding->candidates.end());
     EXPECT_FALSE(verdict.names_surely());

@@ -14,6 +14,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "device/v4l2_device.hpp"
@@ -67,8 +68,8 @@ class V4l2Model : public V4l2Device {
         Buffer& buffer = buffers_[index];
         buffer.is_queued = false;
         std::fill(buffer.memory.begin(), buffer.memory.end(), std::byte{0});
-        std::copy_n(exposure.bytes.begin(), std::min(exposure.bytes.size(), buffer.memory.size()),
-                    buffer.memory.begin());
+        const auto bytes = std::as_bytes(std::span(exposure.bytes));
+        std::ranges::copy(bytes.first(std::min(bytes.size(), buffer.memory.size())), buffer.memory.begin());
         buffer.bytesused = uint32_t(format_.sizeimage - exposure.bytes_short);
         buffer.sequence = sequence;
         buffer.flags = exposure.flags;
