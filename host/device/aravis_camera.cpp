@@ -14,6 +14,7 @@
 #include "device/delivery_count.hpp"
 #include "device/library_thread.hpp"
 #include "exceptions.hpp"
+#include "steady_clock.hpp"
 
 namespace ols {
 

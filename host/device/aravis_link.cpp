@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Finding, opening and asking a camera. GigE Vision registers by the standard 2.0, chapter "Bootstrap registers".
 #include "device/aravis_link.hpp"
+#include "steady_clock.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -91,11 +92,6 @@ void choose_socket(ArvGvDevice* device) {
 }
 
 }  // namespace
-
-uint64_t steady_ns() {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return uint64_t(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
 
 uint64_t ticks_to_ns(uint64_t ticks, uint64_t ticks_hz) {
     constexpr uint64_t second_ns = 1'000'000'000;

@@ -9,9 +9,6 @@
 
 namespace ols {
 
-// Machine time that does not jump.
-uint64_t steady_ns();
-
 uint64_t ticks_to_ns(uint64_t ticks, uint64_t ticks_hz);
 
 // Buffers that are filled, and frames that were lost for lack of one.

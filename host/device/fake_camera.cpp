@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The fake camera's exposures, by its rate and the machine's clock or by call.
 #include "device/fake_camera.hpp"
+#include "steady_clock.hpp"
 
 #include <fmt/format.h>
 
@@ -17,11 +18,6 @@ constexpr uint64_t clock_begin_ns = 7'000'000'000;  // the camera's clock counts
 constexpr uint64_t call_period_ns = 1'000'000;      // of exposures by trigger()
 constexpr double rate_min_hz = 0.01, rate_max_hz = 100'000;
 constexpr double exposure_max = 1e15;  // whole numbers up to it are exact
-
-uint64_t machine_ns() {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return uint64_t(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
 
 uint64_t period_of(double rate_hz) {
     return rate_hz > 0 ? uint64_t(std::llround(1e9 / rate_hz)) : call_period_ns;
@@ -60,7 +56,7 @@ Result<uint64_t> FakeCamera::start() {
     const std::lock_guard lock(mutex_);
     if (state_.kind != CameraState::live) return fail(state_.why);
     waiting_.clear();
-    begin_ns_ = machine_ns();
+    begin_ns_ = steady_ns();
     running_ = true;
     delivery_.start(clock_ns_);
     return clock_ns_;
@@ -115,8 +111,8 @@ void FakeCamera::catch_up(uint64_t now_ns) {
 
 std::optional<Frame> FakeCamera::read(int timeout_ms) {
     std::unique_lock lock(mutex_);
-    for (const uint64_t until_ns = machine_ns() + uint64_t(timeout_ms) * 1'000'000;;) {
-        const uint64_t now_ns = machine_ns();
+    for (const uint64_t until_ns = steady_ns() + uint64_t(timeout_ms) * 1'000'000;;) {
+        const uint64_t now_ns = steady_ns();
         catch_up(now_ns);
         if (!waiting_.empty()) break;
         if (now_ns >= until_ns || !running_ || state_.kind != CameraState::live) return std::nullopt;

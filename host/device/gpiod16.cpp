@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "device/gpio.hpp"
+#include "steady_clock.hpp"
 
 namespace ols {
 
@@ -24,14 +25,9 @@ constexpr int events_a_read = 16;   // that the kernel keeps
 constexpr int reads_a_wait = 8;     // of one line, so that one that never rests holds up no other
 constexpr int wait_piece_ms = 100;  // between looks at whether the chip is there
 
-uint64_t monotonic_ns() {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return uint64_t(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
-
 uint64_t time_of(const gpiod_line_event& event) {
     const uint64_t stamp = uint64_t(event.ts.tv_sec) * 1'000'000'000 + uint64_t(event.ts.tv_nsec);
-    return std::min(stamp, monotonic_ns());  // kernels before 5.7 stamp by the wall's clock
+    return std::min(stamp, steady_ns());  // kernels before 5.7 stamp by the wall's clock
 }
 
 int flags_of(const GpioLineSetup& setup) {
@@ -101,9 +97,9 @@ class Gpiod16 : public GpioLines {
     }
 
     Result<std::vector<GpioEdge>> wait(int timeout_ms) override {
-        const uint64_t end_ns = monotonic_ns() + uint64_t(std::max(timeout_ms, 0)) * 1'000'000;
+        const uint64_t end_ns = steady_ns() + uint64_t(std::max(timeout_ms, 0)) * 1'000'000;
         for (;;) {
-            const uint64_t now_ns = monotonic_ns();
+            const uint64_t now_ns = steady_ns();
             const int left_ms = now_ns >= end_ns ? 0 : int((end_ns - now_ns + 999'999) / 1'000'000);
             const int ready = ::poll(waiting_.data(), waiting_.size(), std::min(left_ms, wait_piece_ms));
             if (ready < 0 && errno != EINTR) return gone(errno);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// LibraryThread: a thread for the calls of a library that may wait for ever on its device. Whoever makes a call waits for a
-// bounded time; a call that hangs is left behind with all that it holds, and what is asked for after it is not answered either.
+// LibraryThread: a thread for the calls of a library, or of the kernel, that may wait for ever on a device. Whoever makes a call waits
+// for a bounded time; a call that hangs is left behind with all that it holds, and what is asked for after it is not answered either.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <future>
 #include <memory>
@@ -13,10 +14,9 @@ namespace ols {
 // All functions from any thread. A call owns what it touches (by shared pointers): it may outlive whoever made it.
 class LibraryThread {
   public:
-    LibraryThread();
-    // Waits until everything that was posted is done, for at most so long.
+    // `end_patience_ms`: for how long its end waits for everything that was posted.
+    explicit LibraryThread(int end_patience_ms = 10'000);
     ~LibraryThread();
-    static constexpr int end_patience_ms = 10'000;
 
     // Makes the call after those before it, and waits for nothing.
     void post(std::function<void()> call);
@@ -42,7 +42,8 @@ class LibraryThread {
   private:
     struct Shared;
     static void work(Shared& shared);
-    std::shared_ptr<Shared> shared_;
+    const std::shared_ptr<Shared> shared_;
+    const std::chrono::milliseconds end_patience_;
 };
 
 }  // namespace ols

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "device/can_bus.hpp"
+#include "steady_clock.hpp"
 
 namespace ols {
 
@@ -51,10 +52,7 @@ class SocketCan : public CanBus {
         return std::optional<can_frame>();
     }
 
-    uint64_t now_us() const override {
-        const auto now = std::chrono::steady_clock::now().time_since_epoch();
-        return uint64_t(std::chrono::duration_cast<std::chrono::microseconds>(now).count());
-    }
+    uint64_t now_us() const override { return steady_ns() / 1000; }
 
   private:
     static constexpr uint64_t queue_timeout_us = 1'000'000;

@@ -8,6 +8,7 @@
 #include <chrono>
 
 #include "exceptions.hpp"
+#include "steady_clock.hpp"
 
 namespace ols {
 
@@ -15,11 +16,6 @@ namespace {
 
 constexpr int look_ms = 20;  // at levels, and at whether the take is to stop
 constexpr const char* use_names[] = {"arm", "emergency_stop", "genlock"};
-
-uint64_t now_ns() {
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    return uint64_t(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-}
 
 }  // namespace
 
@@ -65,7 +61,7 @@ StageLines::StageLines(std::unique_ptr<GpioLines> lines, const GpioSetup& setup,
     } else {
         for (size_t n = 0; n < inputs_.size(); ++n)
             inputs_[n].level = DebouncedLevel((*levels)[n], uint64_t(inputs_[n].setup.debounce_ms) * 1'000'000);
-        look(*levels, now_ns());
+        look(*levels, steady_ns());
     }
     thread_ = std::thread([this] {
         const Status watched = guarded("the GPIO lines cannot be followed", [this] { return watch(), Status(Done{}); });
@@ -93,7 +89,7 @@ void StageLines::watch() {
         const auto edges = lines_->wait(look_ms);
         const bool is_quiet = edges.ok() && edges->empty();
         const auto levels = is_quiet ? lines_->levels() : Result<std::vector<bool>>(std::vector<bool>());
-        const uint64_t now = now_ns();
+        const uint64_t now = steady_ns();
         const std::lock_guard lock(mutex_);
         if (end_) return;
         if (!edges.ok() || !levels.ok()) return note_trouble((edges.ok() ? levels.error() : edges.error()).message);

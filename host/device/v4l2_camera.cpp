@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Calls that may hang (set-up, stream on and off) go through AttendedCalls; taking a frame does not wait in the kernel.
+// Calls that may hang (set-up, stream on and off) go through a LibraryThread; taking a frame does not wait in the kernel.
 #include "device/v4l2_camera.hpp"
 
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 #include <cstring>
 #include <mutex>
 
-#include "device/attended_calls.hpp"
 #include "device/delivery_count.hpp"
+#include "device/library_thread.hpp"
 #include "device/v4l2_setup.hpp"
 #include "device/v4l2_stamps.hpp"
 #include "device/v4l2_stream.hpp"
@@ -41,7 +41,7 @@ class V4l2Camera : public Camera {
           model_(fmt::format("{} ({})", text_of(is.card, sizeof is.card), text_of(is.bus_info, sizeof is.bus_info))),
           driver_(text_of(is.driver, sizeof is.driver)),
           index_(index),
-          patience_ns_(uint64_t(patience_ms) * 1'000'000),
+          patience_ms_(patience_ms),
           calls_(patience_ms) {}
 
     ~V4l2Camera() override { (void)end_stream(true); }
@@ -57,7 +57,7 @@ class V4l2Camera : public Camera {
     Status set_up(const CameraSetup& wanted) override {
         stop();
         if (const CameraState now = state(); now.kind == CameraState::gone) return fail(now.why);
-        auto made = calls_.run([device = device_, stream = stream_, name = name_, wanted]() -> Result<V4l2Setup> {
+        auto made = ask([device = device_, stream = stream_, name = name_, wanted]() -> Result<V4l2Setup> {
             stream->release();
             auto setup = set_up_v4l2(*device, name, wanted);
             if (!setup.ok()) return setup;
@@ -79,7 +79,7 @@ class V4l2Camera : public Camera {
             if (state_.kind == CameraState::gone) return fail(state_.why);
             state_ = {};
         }
-        const auto begun = calls_.run([stream = stream_] { return stream->end(), stream->begin(); });
+        const auto begun = ask([stream = stream_] { return stream->end(), stream->begin(); });
         if (!begun && is_stop_asked_) return fail(name_ + " was stopped while it started");
         if (!begun) return fail(unanswered("VIDIOC_STREAMON"));
         if (!begun->ok()) return fail(why_refused(begun->error().message));
@@ -95,7 +95,7 @@ class V4l2Camera : public Camera {
 
     void stop() override {
         is_stop_asked_ = true;
-        calls_.give_up();
+        ++stops_;
         {
             const std::lock_guard lock(mutex_);
             is_streaming_ = false;
@@ -151,8 +151,16 @@ class V4l2Camera : public Camera {
   private:
     using Taken = std::optional<Frame>;
 
+    uint64_t patience_ns() const { return uint64_t(patience_ms_) * 1'000'000; }
+
+    // What `call` returns; nothing when it has not within the patience, or when the camera was stopped meanwhile.
+    template <typename Call>
+    std::optional<std::invoke_result_t<Call>> ask(Call call) {
+        return calls_.run(std::move(call), patience_ms_, [this, stops = stops_.load()] { return stops_ != stops; });
+    }
+
     bool end_stream(bool for_good) {
-        const auto ended = calls_.run([stream = stream_, for_good] {
+        const auto ended = ask([stream = stream_, for_good] {
             stream->end();
             if (for_good) stream->release();
             return true;
@@ -232,7 +240,7 @@ class V4l2Camera : public Camera {
     std::string unanswered(const std::string& call) {
         const std::lock_guard lock(mutex_);
         lose(fmt::format("it gave no answer to {} within {} s; unplug it and plug it in again", call,
-                         double(patience_ns_) * 1e-9));
+                         double(patience_ns()) * 1e-9));
         return state_.why;
     }
     // Of a refusal by a device that may have gone meanwhile.
@@ -241,7 +249,7 @@ class V4l2Camera : public Camera {
         return state().why;
     }
     bool answers() {
-        const auto error = calls_.run([device = device_] {
+        const auto error = ask([device = device_] {
             v4l2_capability is{};
             return device->ioctl(VIDIOC_QUERYCAP, &is);
         });
@@ -256,7 +264,7 @@ class V4l2Camera : public Camera {
     bool is_alive() {
         {
             const std::lock_guard lock(mutex_);
-            if (device_->now_ns() - last_sign_ns_ < patience_ns_) return true;
+            if (device_->now_ns() - last_sign_ns_ < patience_ns()) return true;
             last_sign_ns_ = device_->now_ns();
         }
         return answers();
@@ -266,7 +274,7 @@ class V4l2Camera : public Camera {
     const std::shared_ptr<V4l2Stream> stream_;
     const std::string name_, model_, driver_;
     const uint32_t index_;
-    const uint64_t patience_ns_;
+    const int patience_ms_;
     std::atomic<bool> is_stop_asked_ = false;
 
     mutable std::mutex mutex_;
@@ -277,8 +285,13 @@ class V4l2Camera : public Camera {
     uint64_t underrun_ = 0, overwritten_ = 0, last_sign_ns_ = 0;
     bool is_streaming_ = false;
 
-    AttendedCalls calls_;  // ends before what it uses
+    std::atomic<uint64_t> stops_ = 0;
+    LibraryThread calls_;  // ends before what it uses
 };
+
+std::string does_not_open(const std::string& name) {
+    return name + " does not open: unplug it and plug it in again";
+}
 
 Error no_camera(const std::string& name, uint32_t can) {
     if (can & (V4L2_CAP_VIDEO_CAPTURE_MPLANE | V4L2_CAP_VIDEO_M2M_MPLANE))
@@ -299,8 +312,16 @@ Error no_camera(const std::string& name, uint32_t can) {
 Result<std::unique_ptr<Camera>> make_v4l2_camera(std::shared_ptr<V4l2Device> device, const std::string& path,
                                                  uint32_t index, int patience_ms) {
     const std::string name = "the camera v4l2:" + path;
-    v4l2_capability is{};
-    if (const int error = device->ioctl(VIDIOC_QUERYCAP, &is); error != 0)
+    LibraryThread calls(patience_ms);
+    const auto ask_what_it_is = [device] {
+        v4l2_capability is{};
+        const int error = device->ioctl(VIDIOC_QUERYCAP, &is);
+        return std::pair(error, is);
+    };
+    const auto told = calls.run(ask_what_it_is, patience_ms, [] { return false; });
+    if (!told) return fail(does_not_open(name));
+    const auto& [error, is] = *told;
+    if (error != 0)
         return fail(fmt::format("{} is no V4L2 device ({}): `v4l2-ctl --list-devices` says which there are", name,
                                 std::strerror(error)));
     const uint32_t can = is.capabilities & V4L2_CAP_DEVICE_CAPS ? is.device_caps : is.capabilities;
@@ -315,14 +336,12 @@ Result<std::unique_ptr<Camera>> open_v4l2_camera(const std::string& text, uint32
         return fail("'v4l2:" + text +
                     "' names no device: write v4l2:/dev/video0 or v4l2:0 (`v4l2-ctl --list-devices`)");
     const std::string path = is_number ? "/dev/video" + text : text;
-    AttendedCalls calls(Camera::device_patience_ms);
-    auto camera = calls.run([path, index]() -> Result<std::unique_ptr<Camera>> {
-        auto device = open_v4l2_device(path);
-        if (!device.ok()) return device.error();
-        return make_v4l2_camera(std::move(*device), path, index);
-    });
-    if (!camera) return fail("the camera v4l2:" + path + " does not open: unplug it and plug it in again");
-    return std::move(*camera);
+    LibraryThread calls;
+    auto device =
+        calls.run([path] { return open_v4l2_device(path); }, Camera::device_patience_ms, [] { return false; });
+    if (!device) return fail(does_not_open("the camera v4l2:" + path));
+    if (!device->ok()) return device->error();
+    return make_v4l2_camera(std::move(**device), path, index);
 }
 
 }  // namespace ols

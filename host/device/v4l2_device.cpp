@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The kernel's side of a V4L2 device.
 #include "device/v4l2_device.hpp"
+#include "steady_clock.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -41,10 +42,7 @@ class KernelDevice : public V4l2Device {
         return memory == MAP_FAILED ? nullptr : static_cast<std::byte*>(memory);
     }
     void unmap(std::byte* memory, size_t bytes) override { ::munmap(memory, bytes); }
-    uint64_t now_ns() const override {
-        const auto now = std::chrono::steady_clock::now().time_since_epoch();
-        return uint64_t(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
-    }
+    uint64_t now_ns() const override { return steady_ns(); }
 
   private:
     int fd_;

@@ -10,6 +10,7 @@
 
 #include "device/log_reader.hpp"
 #include "exceptions.hpp"
+#include "steady_clock.hpp"
 
 namespace ols {
 
@@ -25,10 +26,6 @@ Reason reason_to_end(const ols_status_reply& status, const Reason& why_told) {
     if (status.state == OLS_STATE_FAULT)
         return {Cause::board_did_not_fire, "the board stopped with fault " + fault_text(status)};
     return why_told.empty() ? Reason{Cause::stopped, "somebody stopped the board"} : why_told;
-}
-
-uint64_t steady_ns() {
-    return uint64_t(std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count());
 }
 
 LogEnd lost(std::string why) {

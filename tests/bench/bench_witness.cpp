@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <random>
+#include <ranges>
 
 #include "align_takes.hpp"
 #include "bench.hpp"
@@ -107,16 +108,19 @@ class Trials {
         Fault fault{recording_->targets[0], {}, -1};
         if (one.kind == Kind::none) return fault;
         auto& frames = fault.frames.frames;
-        const size_t first = random() % (frames.size() - 1);
+        // A row that lights every lamp has none to light in addition: another slot is struck.
+        size_t first = 0;
+        std::vector<int> lamps;
+        while (lamps.empty()) {
+            first = random() % (frames.size() - 1);
+            lamps = lamps_that(one.kind != Kind::lamp_on, frames[first]->slot);
+        }
+        fault.lamp = lamps[random() % lamps.size()];
         size_t second = first + 1;
         if (one.kind == Kind::swapped_far)
             second = (first + frames.size() / 4 + random() % (frames.size() / 2)) % frames.size();
         auto a = std::make_shared<Frame>(*frames[first]), b = std::make_shared<Frame>(*frames[second]);
         const auto lines = uint32_t(one.share * a->height), from = uint32_t(random() % (a->height - lines + 1));
-        const Basis& basis = recording_->sequence.basis;
-        const int row = recording_->sequence.slots[a->slot].row;
-        do fault.lamp = int(random() % uint32_t(basis.lamps));
-        while (basis.lit(row, fault.lamp) != (one.kind != Kind::lamp_on) || !is_seen(fault.lamp));
         const double exposure_us = double(a->exposure_ticks) / double(ticks_per_us);
         std::normal_distribution<double> normal;
         for (uint32_t y = from; y < from + lines; ++y) {
@@ -151,6 +155,21 @@ class Trials {
 
     static uint16_t counted(double value, const Frame& frame) {
         return uint16_t(std::lround(std::clamp(value, 0.0, double(frame.white))));
+    }
+
+    // The lamps that a slot lights, or leaves dark, among those that the subject shows.
+    std::vector<int> lamps_that(bool are_lit, size_t slot) const {
+        const Basis& basis = recording_->sequence.basis;
+        std::vector<int> lamps;
+        for (int lamp = 0; lamp < basis.lamps; ++lamp)
+            if (basis.lit(recording_->sequence.slots[slot].row, lamp) == are_lit && is_seen(lamp))
+                lamps.push_back(lamp);
+        if (lamps.empty() &&
+            !std::ranges::any_of(std::views::iota(0, basis.lamps), [&](int l) { return is_seen(l); })) {
+            fmt::print(stderr, "bench_witness: the subject shows no lamp\n");
+            std::exit(1);
+        }
+        return lamps;
     }
 
     // Lamps that the subject shows at least half as bright as the mean.

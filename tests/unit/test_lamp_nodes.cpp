@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Telemetry of lamp nodes from a bus that a test holds, in bytes as PROTOCOL.md draws them.
 // links: ols_device
+#include "comes_true.hpp"
 #include "device/lamp_nodes.hpp"
 
 #include <gtest/gtest.h>
@@ -9,18 +10,10 @@
 #include <deque>
 
 using namespace ols;
+using namespace ols::test;
 using namespace std::chrono_literals;
 
 namespace {
-
-template <typename Condition>
-bool comes_true(Condition condition) {
-    for (const auto end = std::chrono::steady_clock::now() + 120s; std::chrono::steady_clock::now() < end;) {
-        if (condition()) return true;
-        std::this_thread::sleep_for(1ms);
-    }
-    return false;
-}
 
 // Frames and time are the test's: time stands still but when it is told to go on.
 struct Wire {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The stage's lines over a chip that a test holds: what stops a take, what begins it, and which edges are known to be lost.
 // links: ols_device
+#include "comes_true.hpp"
 #include "device/stage_lines.hpp"
+#include "steady_clock.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,23 +11,10 @@
 #include <random>
 
 using namespace ols;
+using namespace ols::test;
 using namespace std::chrono_literals;
 
 namespace {
-
-uint64_t now_ns() {
-    return uint64_t(std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count());
-}
-
-// Comes true within a patience that no machine exhausts.
-template <typename Condition>
-bool comes_true(Condition condition) {
-    for (const auto end = std::chrono::steady_clock::now() + 120s; std::chrono::steady_clock::now() < end;) {
-        if (condition()) return true;
-        std::this_thread::sleep_for(1ms);
-    }
-    return false;
-}
 
 // What the test moves; inputs in the order arm, emergency stop, genlock as far as they are there.
 struct Chip {
@@ -37,7 +26,7 @@ struct Chip {
     bool is_gone = false;
     uint64_t waits = 0;
 
-    void move(size_t input, bool active, bool with_edge = true, uint64_t time_ns = now_ns()) {
+    void move(size_t input, bool active, bool with_edge = true, uint64_t time_ns = steady_ns()) {
         const std::lock_guard lock(mutex);
         levels[input] = active;
         if (with_edge) waiting.push_back({input, active, time_ns});
@@ -214,7 +203,7 @@ TEST_F(StageLinesTest, a_take_does_not_begin_while_the_emergency_stop_is_held_or
 
 TEST_F(StageLinesTest, genlock_that_is_lost_ends_the_take_and_a_glitch_does_not) {
     ASSERT_TRUE(lines().begin_take(stop_).ok());
-    chip_.glitch(genlock, now_ns(), 29'000'000);  // 1 ms short of its 30
+    chip_.glitch(genlock, steady_ns(), 29'000'000);  // 1 ms short of its 30
     chip_.settle();
     EXPECT_TRUE(reasons().empty());
     chip_.move(genlock, false);
@@ -238,7 +227,7 @@ TEST_F(StageLinesTest, the_arm_button_counts_when_it_is_pressed_anew_and_held_fo
     std::thread presser([&] {
         chip_.settle();
         EXPECT_FALSE(has_begun);
-        chip_.glitch(arm, now_ns(), 1'000'000);  // bounces, it was not let go
+        chip_.glitch(arm, steady_ns(), 1'000'000);  // bounces, it was not let go
         chip_.settle();
         EXPECT_FALSE(has_begun);
         chip_.move(arm, false);
