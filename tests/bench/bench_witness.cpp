@@ -7,8 +7,8 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <random>
-#include <ranges>
 
 #include "align_takes.hpp"
 #include "bench.hpp"
@@ -47,6 +47,7 @@ class Trials {
         }
         recording_ = std::make_unique<Recording>(std::move(*recording));
         lamps_ = std::move(*lamps);
+        seen_ = seen_of(lamps_);
         if (quality_.compensates) path_ = *developer(0).find_path(recording_->targets[0]);
     }
 
@@ -161,27 +162,25 @@ class Trials {
     std::vector<int> lamps_that(bool are_lit, size_t slot) const {
         const Basis& basis = recording_->sequence.basis;
         std::vector<int> lamps;
-        for (int lamp = 0; lamp < basis.lamps; ++lamp)
-            if (basis.lit(recording_->sequence.slots[slot].row, lamp) == are_lit && is_seen(lamp))
-                lamps.push_back(lamp);
-        if (lamps.empty() &&
-            !std::ranges::any_of(std::views::iota(0, basis.lamps), [&](int l) { return is_seen(l); })) {
-            fmt::print(stderr, "bench_witness: the subject shows no lamp\n");
-            std::exit(1);
-        }
+        for (const int lamp : seen_)
+            if (basis.lit(recording_->sequence.slots[slot].row, lamp) == are_lit) lamps.push_back(lamp);
         return lamps;
     }
 
-    // Lamps that the subject shows at least half as bright as the mean.
-    bool is_seen(int lamp) const {
-        double own = 0, all = 0;
-        for (size_t l = 0; l < lamps_.size(); ++l)
-            for (size_t p = 0; p < lamps_[l].size(); p += 97) (int(l) == lamp ? own : all) += double(lamps_[l][p]);
-        return own > 0.5 * (own + all) / double(lamps_.size());
+    // The lamps that the subject shows at least half as bright as the mean.
+    static std::vector<int> seen_of(const std::vector<std::vector<float>>& lamps) {
+        std::vector<double> sums;
+        for (const auto& lamp : lamps) sums.push_back(std::accumulate(lamp.begin(), lamp.end(), 0.0));
+        const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / double(sums.size());
+        std::vector<int> seen;
+        for (size_t lamp = 0; lamp < sums.size(); ++lamp)
+            if (sums[lamp] >= 0.5 * mean) seen.push_back(int(lamp));
+        return seen;
     }
 
     std::unique_ptr<Recording> recording_;
     std::vector<std::vector<float>> lamps_;
+    std::vector<int> seen_;
     const MotionQuality quality_;
     MotionPath path_;
     std::map<int, std::unique_ptr<MotionDeveloper>> developers_;
