@@ -73,14 +73,6 @@ std::optional<std::string> AravisFeatures::words(const char* name) {
     return value;
 }
 
-std::string AravisFeatures::unit(const char* name) {
-    ArvGcNode* found = node(name);
-    const char* unit = ARV_IS_GC_FLOAT(found)     ? arv_gc_float_get_unit(ARV_GC_FLOAT(found))
-                       : ARV_IS_GC_INTEGER(found) ? arv_gc_integer_get_unit(ARV_GC_INTEGER(found))
-                                                  : nullptr;
-    return unit ? unit : "";
-}
-
 std::vector<std::string> AravisFeatures::choices(const char* name) {
     if (!has(name)) return {};
     LibraryError error;

@@ -53,7 +53,6 @@ class AravisFeatures {
     std::optional<double> number(const char* name);  // of a float, or an integer
     std::optional<bool> flag(const char* name);
     std::optional<std::string> words(const char* name);  // of a feature of any kind
-    std::string unit(const char* name);
     std::vector<std::string> choices(const char* name);  // of an enumeration, those that can be had now
     struct Range {
         int64_t least, most, step;

@@ -57,7 +57,6 @@ bool AravisFrames::unpack(ArvBuffer* buffer, Frame& frame) const {
     frame.width = uint32_t(std::max(width, 0));
     frame.height = uint32_t(std::max(height, 0));
     frame.pitch_bytes = frame.width * uint32_t(sizeof(uint16_t));
-    frame.black = float(setup_.black_counts);
     const bool is_as_set_up = arv_buffer_get_image_pixel_format(buffer) == setup_.pixel_code && setup_.layout &&
                               width == setup_.in_force.width && height == setup_.in_force.height;
     if (!is_as_set_up) return true;  // and whoever gets it sees that

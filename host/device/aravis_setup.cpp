@@ -38,7 +38,6 @@ class SettingUp {
         set_exposure();
         set_chunks();
         read_controls();
-        read_black();
         if (!camera_.broken().empty()) return fail(name + " is gone: it gives no answer (" + camera_.broken() + ")");
         const Status as_wanted = check_setup(name, wanted_, setup_.in_force, lacks_);
         std::string message = as_wanted.ok() ? "" : as_wanted.error().message;
@@ -213,18 +212,6 @@ class SettingUp {
             const bool are_numbers = !value.empty() && !*end && !taken->empty() && !*taken_end;
             setup_.in_force.controls[name] = are_numbers && is_same(number, taken_number) ? value : *taken;
         }
-    }
-
-    // Counts, or a share of white; of another unit nothing can be made.
-    void read_black() {
-        const char* name = camera_.first_of({"BlackLevel", "BlackLevelRaw"});
-        if (!name || !setup_.layout) return;
-        const double white = double((1 << setup_.layout->bits) - 1);
-        const std::string unit = camera_.unit(name);
-        double black = camera_.number(name).value_or(0);
-        if (unit == "%") black *= white / 100;
-        const bool is_known = unit.empty() || unit == "DN" || unit == "%";
-        if (is_known && black > 0 && black < white / 2) setup_.black_counts = black;
     }
 
     AravisFeatures& camera_;

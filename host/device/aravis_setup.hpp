@@ -21,7 +21,6 @@ struct AravisSetup {
     std::optional<SampleLayout> layout;  // of that; nothing when frames of it cannot be read
     uint32_t pixel_code = 0;             // PFNC's
     int64_t offset_x = 0, offset_y = 0;  // of the region in the sensor
-    double black_counts = 0;             // as the camera states it
     bool has_chunk_time = false;         // frames carry the time of their exposure
 };
 

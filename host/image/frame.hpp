@@ -51,8 +51,8 @@ struct Frame {
     PixelFormat format = PixelFormat::u16;
     Cfa cfa = Cfa::none;
     uint32_t pitch_bytes = 0;  // from row to row
-    float black = 0;           // counts of no light, as the camera states it
-    float white = 4095;        // counts at which a sample saturates
+    float black = 0;  // counts of no light; of a take's whole counts as measured or, failing that, as the stage has it
+    float white = 4095;  // counts at which a sample saturates
 
     std::vector<std::byte> samples;  // height * pitch_bytes
 

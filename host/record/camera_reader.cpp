@@ -2,6 +2,8 @@
 // Frames in, and what is known of each.
 #include "record/camera_reader.hpp"
 
+#include <algorithm>
+
 #include "exceptions.hpp"
 
 namespace ols {
@@ -63,6 +65,13 @@ void CameraReader::count_drops() {
     if (more > 0) (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
 }
 
+// A sensor may saturate below the largest count of its format, and few cameras say where their black is: the stage does.
+void CameraReader::take_levels(Frame& frame) const {
+    if (frame.format != PixelFormat::u16) return;
+    frame.black = float(options_.black_counts.value_or(config_.black));
+    frame.white = std::min(frame.white, float(config_.white));
+}
+
 void CameraReader::enqueue(Frame frame) {
     FrameNews news;
     news.witness.arrival = arrivals_++;
@@ -71,7 +80,8 @@ void CameraReader::enqueue(Frame frame) {
     if (!is_whole(frame, config_)) {
         news.witness.unfit = {Cause::wrong_size, "its size or format is not the stage's"};
     } else {
-        news.witness.summary = summarize_frame(frame, options_.black_counts.value_or(frame.black), config_.noise);
+        take_levels(frame);
+        news.witness.summary = summarize_frame(frame, frame.black, config_.noise);
         news.bits = bits_.read(frame);
     }
     news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = room_](Frame* last) {

@@ -36,7 +36,7 @@ using RecordEvent = std::variant<FrameNews, CameraPause, LogNews, LogEnd>;
 using RecordQueue = EventQueue<RecordEvent>;
 
 struct CameraReaderOptions {
-    std::optional<double> black_counts;  // measured; without it, the one that each frame states
+    std::optional<double> black_counts;  // measured; without it, the stage's
     size_t frames_max = 0;               // in memory: read, and not let go of
     std::function<bool()> waits_for_disk;
 };
@@ -59,6 +59,7 @@ class CameraReader {
 
     void read();
     void count_drops();
+    void take_levels(Frame& frame) const;
     void enqueue(Frame frame);
 
     Camera& camera_;

@@ -34,7 +34,7 @@ struct RecordSink {
 struct RecordedCamera {
     Camera& camera;
     uint32_t index = 0;                  // among the stage's
-    std::optional<double> black_counts;  // measured; without it, the one that each frame states
+    std::optional<double> black_counts;  // measured; without it, the stage's
     RecordSink sink;
 };
 

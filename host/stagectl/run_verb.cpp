@@ -97,7 +97,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
         "take.rfa\n"
         "Ctrl-C turns the light off and finishes the archive with what was recorded; a second one ends at once.\n"
         "Exit codes: 0 every slot and target is there; 1 an error; 2 the archive is finished, and slots or targets are "
-        "missing.\nFlashing light can trigger seizures: see `stagectl sequence`.");
+        "missing or were left out.\nFlashing light can trigger seizures: see `stagectl sequence`.");
     options->take.sequence.add_to(*verb, "--sequence");
     verb->add_option("--cycles", options->cycles, "how often to play the cycle; otherwise as the sequence says")
         ->check(CLI::Range(1, 1'000'000));

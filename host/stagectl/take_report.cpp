@@ -20,6 +20,7 @@ nlohmann::json to_json(const OutputReport& report, const std::string& archive) {
             {"unsolved_share", report.unsolved_share},
             {"misaligned_share", report.misaligned_share},
             {"suspect_targets", report.suspicion.suspect_targets},
+            {"slots_left_out", report.suspicion.slots_left_out},
             {"suspicions", report.suspicion.targets},
             {"suspect_lamps", report.suspicion.lamps},
             {"seconds",
@@ -55,6 +56,9 @@ void print_suspicion(const SuspicionReport& suspicion, const std::string& folder
             first["says"][0].get<std::string>(),
             first.contains("taken_as_missing") ? ", and was taken as missing" : "");
     }
+    if (suspicion.slots_left_out > 0)
+        fmt::print(stderr, "stagectl: {} slots left out of their targets ({})\n", suspicion.slots_left_out,
+                   cause_words(Cause::swapped));
     for (const auto& [name, lamp] : suspicion.lamps.items())
         fmt::print(stderr,
                    "stagectl: {} gave {:.2f} +- {:.2f} of the light that {}, from target {} on: look at the lamp\n",
@@ -141,7 +145,7 @@ Result<int> finish_take(const TakeReport& report, bool is_estimate, const std::v
     int missing = 0;
     for (const OutputReport& output : report.outputs) {
         if (!output.write_error.empty()) return 1;
-        missing += output.targets_missing;
+        missing += output.targets_missing + output.suspicion.slots_left_out;
     }
     return missing > 0 || report.record.missing().total() > 0 ? 2 : 0;
 }

@@ -142,6 +142,7 @@ void CameraDeveloper::describe(Target& target, nlohmann::json& detail) {
 
 void CameraDeveloper::note_suspicion(uint32_t target, const nlohmann::json& account) {
     SuspicionReport& report = report_.suspicion;
+    if (account.contains("taken_as_missing")) report.slots_left_out += int(account["taken_as_missing"].size());
     if (account.contains("suspect") && size_t(report.suspect_targets++) < SuspicionReport::targets_max) {
         nlohmann::json one = {
             {"camera", camera_}, {"target", target}, {"suspect", account["suspect"]}, {"says", account["says"]}};

@@ -139,6 +139,7 @@ Error nothing_came(const RecordReport& record) {
 
 void SuspicionReport::add(const SuspicionReport& other) {
     suspect_targets += other.suspect_targets;
+    slots_left_out += other.slots_left_out;
     for (const nlohmann::json& target : other.targets)
         if (targets.size() < targets_max) targets.push_back(target);
     for (const auto& [name, lamp] : other.lamps.items())

@@ -68,6 +68,7 @@ struct TakeSinks {
 // What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).
 struct SuspicionReport {
     int suspect_targets = 0;  // of which a slot is suspect
+    int slots_left_out = 0;   // of all targets: surely named, and taken as missing
     // Of the first of these: "camera", "target", "suspect", "says"; where slots were "taken_as_missing", which, and the "cause".
     nlohmann::json targets;
     // By lamp, as in the last target that named it, with "camera", "first_target" and "last_target".

@@ -38,8 +38,9 @@ def pack(frame, packing):
     return np.packbits(bits.astype(np.uint8)).tobytes()
 
 
-def write_cine(path, frames, times_ns=None, packing="16", cfa=4, bits=12, black=64, white=4095, first=-100, rate=2160, annotation=b""):
-    """`frames`: [n, height, width] of counts; cfa 3: GBRG, 4: RGGB, 5: GRBG, 6: BGGR; first: the number of the first frame."""
+def write_cine(path, frames, times_ns=None, packing="16", cfa=4, bits=12, black=64, white=4095, first=-100, rate=2160, annotation=b"", apart=0):
+    """`frames`: [n, height, width] of counts; cfa 3: GBRG, 4: RGGB, 5: GRBG, 6: BGGR; first: the number of the first frame;
+    apart: from one frame to the next, in bytes, where that is more than it takes (the file has holes there)."""
     count, height, width = frames.shape
     block = setup(cfa, bits, black, white, rate, 412000)
     images = [struct.pack("<I", 8 + len(annotation)) + annotation + struct.pack("<I", len(image)) + image
@@ -53,12 +54,13 @@ def write_cine(path, frames, times_ns=None, packing="16", cfa=4, bits=12, black=
     at, offsets = offsets_at + 8 * count, []
     for image in images:
         offsets.append(at)
-        at += len(image)
+        at += max(len(image), apart)
     header = struct.pack("<HHHHiIiIIII", 0x4943, 44, 2, 1, first - 7, count + 50, first, count, 44, 84, offsets_at) + time64(10**18)
     compression = {"16": 0, "8": 0, "10": 256, "12": 1024}[packing]
     depth = 8 if packing == "8" else 16
     bitmap = struct.pack("<IiiHHIIiiII", 40, width, height, 1, depth, compression, len(pack(frames[0], packing)), 0, 0, 0, 4096)
     with open(path, "wb") as file:
         file.write(header + bitmap + block + blocks + struct.pack(f"<{count}q", *offsets))
-        for image in images:
+        for offset, image in zip(offsets, images):
+            file.seek(offset)
             file.write(image)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Recordings in a camera's own memory, ingested: bit for bit the targets of the live take of the same frames."""
 import json
+import os
 import subprocess
+import sys
 
 import numpy as np
 import OpenEXR
@@ -10,9 +12,13 @@ import tifffile
 from PIL import Image
 
 from cine_writer import write_cine
-from virtual_take import BIN, HEIGHT, WIDTH, VirtualStage, identification, manifest, read_lamps, read_plane, sequence, slots_of
+from virtual_take import BIN, HEIGHT, ROOT, WIDTH, VirtualStage, identification, manifest, read_lamps, read_plane, sequence, slots_of
+
+sys.path.append(str(ROOT / "tests/unit"))
+from picture_files import write_dng  # noqa: E402
 
 CYCLES, CYCLE = 4, 180
+BLACK, WHITE = 64, 4095  # of the stage, as it is by default
 CUT = 47  # frames of cycle 0 that were not recorded: 2 groups and 11 slots
 
 
@@ -26,11 +32,14 @@ class Live:
         self.counts, self.times = kept["counts"], kept["ns"]
         assert len(kept) == CYCLES * CYCLE
 
-    def ingest(self, recording, name, *options, code=0):
+    def command(self, recording, name, *options):
         archive = self.folder / f"{name}.rfa"
-        command = [BIN / "stagectl", "ingest", recording, "--sequence", sequence("s159"), "--stage", self.stage, "--nominal", "-o", archive,
-                   "--overwrite", "--json", *options]
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=300)
+        return archive, list(map(str, [BIN / "stagectl", "ingest", recording, "--sequence", sequence("s159"), "--stage", self.stage,
+                                       "--nominal", "-o", archive, "--overwrite", "--json", *options]))
+
+    def ingest(self, recording, name, *options, code=0):
+        archive, command = self.command(recording, name, *options)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
         assert done.returncode == code, (done.returncode, done.stdout, done.stderr)
         return (archive, json.loads(done.stdout)) if code != 1 else done.stderr
 
@@ -54,9 +63,14 @@ def write_pictures(folder, counts, kind, first=1):
             Image.fromarray(frame.astype(np.uint16)).save(folder / f"take_{number:06}.png")
         elif kind == "tif":
             tifffile.imwrite(folder / f"take_{number:06}.tif", frame)
-        elif kind == "exr":
+        elif kind in ("exr", "exr of fractions"):
+            values = frame.astype(np.float32) / np.float32(1 if kind == "exr" else WHITE)
             OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage},
-                         {"Y": frame.astype(np.float32)}).write(str(folder / f"take_{number:06}.exr"))
+                         {"Y": values}).write(str(folder / f"take_{number:06}.exr"))
+        elif kind == "pgm":  # pgm(5): two bytes a sample, the most significant first
+            (folder / f"take_{number:06}.pgm").write_bytes(b"P5\n%d %d\n%d\n" % (WIDTH, HEIGHT, WHITE) + frame.astype(">u2").tobytes())
+        elif kind == "dng":
+            write_dng(folder / f"take_{number:06}.dng", frame.astype(np.uint16), black=BLACK, white=WHITE)
         elif kind == "12p":  # PFNC: the lowest bits first
             bits = (frame.ravel()[:, None] >> np.arange(12)) & 1
             (folder / f"take_{number:06}.raw").write_bytes(np.packbits(bits.astype(np.uint8), bitorder="little").tobytes())
@@ -82,11 +96,29 @@ def test_a_cine_without_times_does_as_well(live):
     assert manifest(archive)["extra"]["recording"]["times"] == "number times period"
 
 
-@pytest.mark.parametrize("kind", ["png", "tif", "exr", "12p"])
+def test_tens_of_gigabytes_take_no_more_memory_than_a_small_file(live):
+    """Frames so far apart that the file is 40 GiB long, most of it holes."""
+    sizes, memory = {}, {}
+    for name, apart in (("small", 0), ("large", 64 << 20)):
+        path = live.folder / f"{name}.cine"
+        write_cine(path, live.counts[CUT:], live.times[CUT:], apart=apart)
+        sizes[name] = path.stat().st_size
+        process = subprocess.Popen(live.command(path, name)[1], stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        assert status == 0
+        memory[name] = used.ru_maxrss
+        live.expect_same(live.folder / f"{name}.rfa")
+        path.unlink()
+    assert sizes["large"] > 40 << 30
+    assert memory["large"] < memory["small"] * 1.2, memory
+
+
+@pytest.mark.parametrize("kind", ["png", "tif", "pgm", "dng", "exr", "exr of fractions", "12p"])
 def test_a_numbered_folder_that_began_mid_cycle_gives_the_live_takes_targets(live, kind):
     folder = live.folder / kind
     write_pictures(folder, live.counts[CUT:], kind)
-    archive, report = live.ingest(folder, f"folder_{kind}", *(["--raw", f"{WIDTH}x{HEIGHT}:12p"] if kind == "12p" else []))
+    options = {"12p": ["--raw", f"{WIDTH}x{HEIGHT}:12p"], "exr of fractions": ["--full-scale", 1]}.get(kind, [])
+    archive, report = live.ingest(folder, f"folder_{kind}", *options)
     assert report["targets_written"] == CYCLES - 1 and report["slots_missing"] == 0
     live.expect_same(archive)
 

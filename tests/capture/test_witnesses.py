@@ -37,7 +37,7 @@ def test_pictures_that_changed_places_under_right_stamps_are_named_and_left_out(
     (suspect,) = extra["suspect_targets"]
     assert suspect["target"] == 1 and suspect["suspect"]["fault"] == "swapped"
     assert suspect["suspect"]["slots"] == [[slot, slot + by]] and suspect["taken_as_missing"] == [slot, slot + by]
-    assert suspect["cause"] == "swapped"
+    assert suspect["cause"] == "swapped" and report["slots_left_out"] == 2
     # Without the two the lamps are right: the noise of a target with two rows filled in is below twice the clean one's.
     truth, ours = read_lamps(clean[2], 0), read_lamps(archive, 1)
     noise = np.std(read_lamps(clean[2], 2) - truth)

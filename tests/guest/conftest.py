@@ -11,6 +11,7 @@ sys.path[:0] = [str(HERE), str(ROOT / "tests/hil")]
 
 import kernel  # noqa: E402
 from can_join import CanJoin  # noqa: E402
+from gpio_chip import Chip  # noqa: E402
 from guest import Guest  # noqa: E402
 from ols_board import board as emulated_board  # noqa: E402
 from pacer import Pacer  # noqa: E402
@@ -45,6 +46,7 @@ def emulated(guest):
     def start(*arguments):
         board = emulated_board.EmulatedBoard("--pace", "wall", *arguments, can=True)
         started.append((board, Pacer(guest, board)))
+        board.plug_usb().usb.close()  # it is up
         return board
 
     yield start
@@ -74,7 +76,6 @@ class Bus:
         while "7FF#" not in self.witness.output:  # until it listens
             self.mark("7FF")
         if board:
-            board.bus().close()  # it is up
             self.join.attach(board.path / "can.sock")
 
     def end(self):
@@ -142,6 +143,13 @@ def settle(guest):
         if "light stage sequencer" in found:
             return
     raise TimeoutError("the board does not enumerate: " + guest.run(["dmesg"]).stdout[-2000:])
+
+
+@pytest.fixture
+def chip(guest):
+    made = Chip(guest)
+    yield made
+    made.remove()
 
 
 @pytest.fixture

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Copies the frames of a ring to standard output, their samples only, each when it is due by its stamp: the virtual stage's camera
-// for a device that is fed by write() and stamps frames by itself. In virtual pace the ring holds the stage back to the wall's time.
+// Copies the frames of a ring to standard output: the time of each in nanoseconds (64 bits, little-endian), then its samples. For a
+// device that is fed by write() (inside/feed_loopback.py), whoever shows the frames when they are due.
 //
 // usage: copy_ring RING
 // Starts the ring's camera at once and says so on standard error; ends with it, or with whoever reads.
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
-#include <thread>
+#include <span>
 
 #include "device/ring.hpp"
 
@@ -21,11 +20,11 @@ int refuse(const std::string& message) {
     return 1;
 }
 
-bool write_all(const std::vector<std::byte>& samples) {
-    for (size_t done = 0; done < samples.size();) {
-        const ssize_t written = ::write(STDOUT_FILENO, samples.data() + done, samples.size() - done);
+bool write_all(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+        const ssize_t written = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
         if (written <= 0) return false;
-        done += size_t(written);
+        bytes = bytes.subspan(size_t(written));
     }
     return true;
 }
@@ -36,15 +35,11 @@ int copy_ring(const char* path) {
     const auto started_ns = ring->start(60'000);
     if (!started_ns.ok()) return refuse(started_ns.error().message);
     std::fputs("started\n", stderr);
-    using Clock = std::chrono::steady_clock;
-    std::optional<Clock::time_point> camera_zero;  // when the camera's clock was 0, by ours
     while (ring->writer() == RingReader::Writer::live) {
         const auto frame = ring->read(100);
         if (!frame) continue;
-        const std::chrono::nanoseconds time(frame->stamp.timestamp_ns);
-        if (!camera_zero) camera_zero = Clock::now() - time;
-        std::this_thread::sleep_until(*camera_zero + time);
-        if (!write_all(frame->samples)) return 0;
+        const uint64_t time_ns = frame->stamp.timestamp_ns;
+        if (!write_all(std::as_bytes(std::span(&time_ns, 1))) || !write_all(frame->samples)) return 0;
     }
     return 0;
 }

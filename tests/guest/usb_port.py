@@ -30,7 +30,6 @@ class BoardCable:
     """The emulated board as a device: transfers go out with their tags, answers come in any order."""
 
     def __init__(self, board):
-        board.plug_usb().usb.close()  # it is up
         self.socket = socket.socket(socket.AF_UNIX)
         self.socket.connect(str(board.path / "board.sock"))
 

@@ -207,8 +207,6 @@ TEST(AravisCamera, says_what_it_chose) {
          {"GigE Vision", "packets of 89", "lost ones asked for again", "1024 buffers", "socket buffer of"})
         EXPECT_NE(info.link.find(words), std::string::npos) << words << ": " << info.link;
     EXPECT_EQ(info.setup.trigger_source, "Line1");
-    o.device().trigger();
-    EXPECT_EQ(o.read().black, 64.f);
 }
 
 TEST(AravisLoss, lost_packets_are_asked_for_again_and_the_frame_is_whole) {

@@ -77,6 +77,16 @@ TEST_F(Reading, no_more_frames_are_held_than_may_be_and_what_is_dropped_meanwhil
     EXPECT_EQ(camera_.counts().missing_ids, 7u);
 }
 
+// Neither a UVC camera nor most of GigE Vision tell where they saturate or where black is.
+TEST_F(Reading, the_levels_of_a_camera_that_states_none_are_the_stages) {
+    config_.black = 71, config_.white = 3900;
+    begin();
+    expose(1);
+    const FrameNews news = next_frame();
+    EXPECT_EQ(news.frame->black, 71.f);
+    EXPECT_EQ(news.frame->white, 3900.f);
+}
+
 TEST_F(Reading, what_is_still_dropped_at_the_end_is_told_with_the_pause) {
     begin();
     expose(frames_max);

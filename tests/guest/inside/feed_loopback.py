@@ -2,8 +2,10 @@
 """Feeds a v4l2loopback device by write(), as an mmap writer leaves `sequence` 0: frames from standard input, or numbered ones.
 
 usage: feed_loopback.py DEVICE FOURCC WIDTH HEIGHT BYTES [COUNT RATE_HZ]
-BYTES is a sample's. A numbered frame has its number, from 0, in its first and last sample, as far as it goes in. Says "ready" once the device has its
-format, waits for a line of standard input if frames are to be numbered, and at the end says how many it has written.
+BYTES is a sample's. Frames on standard input have their time before them (copy_ring.cpp): each is shown so long after the first as it was
+exposed after it, by this machine's clock, and the first is held back so that later ones may come late. A numbered frame has its number, from
+0, in its first and last sample, as far as it goes in. Says "ready" once the device has its format, waits for a line of standard input if
+frames are to be numbered, and at the end says how many it has written, and how many came too late to be shown in time.
 """
 import fcntl
 import os
@@ -11,6 +13,7 @@ import struct
 import sys
 import time
 
+HELD_BACK_S = 3.0
 VIDIOC_S_FMT, OUTPUT, FIELD_NONE = 0xC0D05605, 2, 1  # videodev2.h
 
 
@@ -27,7 +30,7 @@ def main():
         sys.exit(f"the device took {got}")
     os.write(fd, bytes(size))  # a first frame: until then nobody may set the device up to read
     print("ready", flush=True)
-    written = 1
+    written, late = 1, 0
     if len(numbers) > 3:
         count, rate_hz = int(numbers[3]), float(numbers[4])
         sys.stdin.readline()
@@ -37,9 +40,16 @@ def main():
             mark = (number % 256**sample_bytes).to_bytes(sample_bytes, "little")
             written += os.write(fd, mark + bytes(size - 2 * sample_bytes) + mark) == size
     else:
-        while len(frame := sys.stdin.buffer.read(size)) == size:
-            written += os.write(fd, frame) == size
-    print(f"written {written}", flush=True)
+        begin = None
+        while len(record := sys.stdin.buffer.read(8 + size)) == 8 + size:
+            exposed_s = int.from_bytes(record[:8], "little") * 1e-9
+            if begin is None:
+                begin = time.monotonic() + HELD_BACK_S - exposed_s
+            wait_s = begin + exposed_s - time.monotonic()
+            late += wait_s < 0
+            time.sleep(max(0.0, wait_s))
+            written += os.write(fd, record[8:]) == size
+    print(f"written {written}, late {late}", flush=True)
     sys.stdin.read()  # the format goes with the last who has the device open
 
 

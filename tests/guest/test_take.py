@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""A whole take in the guest, by the kernel's own interfaces at once: the virtual stage's board on USB, its frames over V4L2, the take
+armed by a button on GPIO, the lamp nodes watched on CAN. Its targets are those of a take over the stage's own socket and ring."""
+import base64
+import io
+import json
+import re
+import subprocess
+import sys
+import tarfile
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import INSIDE, ROOT, STAGECTL
+
+sys.path.append(str(ROOT / "tests/capture"))
+from virtual_take import HEIGHT, SMALL_STAGE, WIDTH, VirtualStage, read_lamps  # noqa: E402
+
+COPY_RING = ROOT / "build/host/bin/copy_ring"
+DEVICE = "/dev/video10"
+# Frames are told from one another by their times, to a twentieth of a period, and a machine that emulates another stalls for milliseconds.
+LAMPS, RATE_HZ, CYCLES = 8, 2, 2
+SEQUENCE = f'basis = "single"\nframe_rate_hz = {RATE_HZ}\n'
+STAGE = SMALL_STAGE + """[lamps]
+lp = "lights.lp"
+[gpio]
+chip = "stage-lines"
+[gpio.arm]
+line = "ARM"
+[gpio.tally]
+line = "TALLY"
+[telemetry]
+bus = "can:vcan0"
+"""
+
+
+def ring_of_lights():
+    angles = 2 * np.pi * np.arange(LAMPS) / LAMPS
+    return f"{LAMPS}\n" + "".join(f"lamp{n} {np.cos(a) / 2:.6f} {np.sin(a) / 2:.6f} {np.sqrt(0.75):.6f}\n" for n, a in enumerate(angles))
+
+
+class TakeStage(VirtualStage):
+    """A virtual stage of few lamps, without its board: that one keeps in step with the guest."""
+
+    def __init__(self, folder):
+        folder.mkdir()
+        (folder / "lights.lp").write_text(ring_of_lights())
+        super().__init__(folder, "card.toml", "--no-board", stage=STAGE)
+
+    def __enter__(self):
+        while not (self.folder / "exposures.sock").exists():
+            assert self.process.poll() is None, self.read_log()
+        return self
+
+
+@pytest.fixture
+def loopback(guest):
+    guest.load("v4l2loopback", "devices=1 video_nr=10 max_buffers=32")
+    started = []
+
+    def start(*command):
+        started.append(guest.start([sys.executable, *command]))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.end()
+    guest.unload("v4l2loopback")
+
+
+class Frames:
+    """The virtual stage's frames, on their way to the device in the guest."""
+
+    def __init__(self, stage, loopback):
+        self.feeder = loopback(INSIDE / "feed_loopback.py", DEVICE, "RG12", WIDTH, HEIGHT, 2)
+        self.feeder.wait_for("ready")
+        self.copy = subprocess.Popen([COPY_RING, stage.folder / "cam0.ring"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert self.copy.stderr.readline() == b"started\n"
+        threading.Thread(target=self._pump, daemon=True).start()
+
+    def _pump(self):
+        try:
+            while part := self.copy.stdout.read1(65536):
+                self.feeder.input.sendall(part)
+        except OSError:
+            pass  # the feeder has ended
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.copy.kill()
+        self.copy.wait()
+        self.copy.stdout.close()
+        self.copy.stderr.close()
+
+
+def fetched(guest, folder):
+    packed = guest.run(["sh", "-c", "tar -C /tmp -c take.rfa | base64 -w0; rm -rf /tmp/take.rfa"]).stdout
+    with tarfile.open(fileobj=io.BytesIO(base64.b64decode(packed))) as tar:
+        tar.extractall(folder, filter="data")
+    return folder / "take.rfa"
+
+
+@pytest.fixture
+def run(guest, emulated, usb, bus, chip, loopback, tmp_path):
+    """Starts a take in the guest; returns its stage and stagectl, which waits for the button."""
+    sequence = tmp_path / "sequence.toml"
+    sequence.write_text(SEQUENCE)
+    opened = []
+
+    def start(cycles):
+        stage = TakeStage(tmp_path / "take").__enter__()
+        opened.append(stage)
+        opened.append(Frames(stage, loopback))
+        board = emulated("--lamp-nodes", "--exposures", stage.folder / "exposures.sock")
+        wires = bus(board)
+        usb(board)
+        process = guest.start([STAGECTL, "run", "--sequence", sequence, "--nominal", "--cycles", cycles, "--stage", stage.stage, "--board",
+                               "usb:", "--camera", f"v4l2:{DEVICE}", "--arm", "--json", "-o", "/tmp/take.rfa"])
+        opened.append(process)
+        process.wait_for("waiting for the arm button")
+        return wires, process
+
+    yield start
+    for one in reversed(opened):
+        one.end() if hasattr(one, "end") else one.__exit__()
+
+
+def test_a_take_by_usb_v4l2_gpio_and_can_has_the_targets_of_one_over_socket_and_ring(guest, chip, run, tmp_path):
+    wires, process = run(CYCLES)
+    assert not chip.value("TALLY")
+    chip.pull("ARM", True)
+    while not chip.value("TALLY") and process.returncode is None:
+        pass
+    assert process.wait(600) == 0, process.errors
+    assert not chip.value("TALLY")
+    assert json.loads(process.output)["causes"] == {}, process.output
+    nodes = {can_id for can_id, _ in wires.candump() if 0x200 <= can_id < 0x220}
+    assert nodes == {0x200 + node for node in range(11)}
+    archive = fetched(guest, tmp_path)
+
+    with VirtualStage(tmp_path / "ring", "card.toml", stage=SMALL_STAGE + f'[lamps]\nlp = "{tmp_path}/take/lights.lp"\n') as stage:
+        stage.stagectl("run", "--sequence", tmp_path / "sequence.toml", "--nominal", "--cycles", CYCLES, "-o", tmp_path / "ring.rfa")
+    for target in range(CYCLES):
+        ours, wanted = read_lamps(archive, target), read_lamps(tmp_path / "ring.rfa", target)
+        assert wanted.size and np.array_equal(ours, wanted), target
+
+
+def test_a_board_that_is_unplugged_in_a_take_is_the_cause_of_what_is_missing_and_the_rest_is_kept(guest, usb, port, chip, run, tmp_path):
+    _, process = run(50)
+    chip.pull("ARM", True)
+    while guest.run(["test", "-e", "/tmp/take.rfa/cam0/target_000000.exr"]).returncode and process.returncode is None:
+        time.sleep(1)
+    port.unplug()
+    assert process.wait(300) == 1
+    assert re.search("unplugged", process.errors), process.errors
+    assert not chip.value("TALLY")
+    archive = fetched(guest, tmp_path)
+    manifest = json.loads((archive / "manifest.json").read_text())
+    assert set(manifest["extra"]["identification"]["causes"]) <= {"board_gone", "no_frame", "link_lost_it"}, manifest["extra"]
+    assert read_lamps(archive, 0).any()
