@@ -108,6 +108,14 @@ class LibusbDevice : public UsbDevice {
     UsbResult read(std::span<uint8_t> buffer, uint32_t timeout_ms) override {
         return bulk(interface_.in, buffer.data(), buffer.size(), timeout_ms);
     }
+    UsbResult clear_stalls() override {
+        for (const uint8_t endpoint : {interface_.out, interface_.in}) {
+            const UsbOutcome outcome = outcome_of(libusb_clear_halt(handle_.get(), endpoint));
+            if (outcome != UsbOutcome::done)
+                return {outcome == UsbOutcome::failed && has_gone() ? UsbOutcome::gone : outcome, 0};
+        }
+        return {UsbOutcome::done, 0};
+    }
 
   private:
     UsbResult bulk(uint8_t endpoint, uint8_t* bytes, size_t count, uint32_t timeout_ms) {

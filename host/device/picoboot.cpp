@@ -117,8 +117,11 @@ Status Picoboot::acknowledge(uint8_t id) {
     return Done{};
 }
 
+// INTERFACE_RESET alone does not do after a stall: it leaves the boot ROM's data toggles, and a host controller may have begun
+// its own anew (Linux on xHCI does). The next packet would then be acknowledged and dropped, as one that came before.
 Status Picoboot::reset() {
-    const UsbResult result = device_->control(to_interface, interface_reset, {}, timeout_ms);
+    UsbResult result = device_->clear_stalls();
+    if (result.outcome == UsbOutcome::done) result = device_->control(to_interface, interface_reset, {}, timeout_ms);
     if (result.outcome != UsbOutcome::done)
         return fail(fmt::format("the boot loader does not react: {}", usb_outcome_text(result.outcome)));
     return Done{};

@@ -35,6 +35,9 @@ class UsbDevice {
     // Bulk transfers. An empty write is a packet of no bytes; a read ends with a short packet or a full buffer.
     virtual UsbResult write(std::span<const uint8_t> bytes, uint32_t timeout_ms) = 0;
     virtual UsbResult read(std::span<uint8_t> buffer, uint32_t timeout_ms) = 0;
+
+    // Takes a stall from both bulk endpoints and begins their data toggles anew, the host's and the device's (USB 2.0 9.4.5).
+    virtual UsbResult clear_stalls() = 0;
 };
 
 // A device that is plugged in.

@@ -18,11 +18,12 @@ from pacer import Pacer  # noqa: E402
 from usb_port import BoardCable, UsbPort  # noqa: E402
 
 STAGECTL = ROOT / "build/host/bin/stagectl"
+UF2 = ROOT / "build/firmware/stage.uf2"
 INSIDE = HERE / "inside"
 
 
 def pytest_configure():
-    for path, how in ((STAGECTL, "run `make host`"), (emulated_board.IMAGE, "run `make firmware`"),
+    for path, how in ((STAGECTL, "run `make host`"), (emulated_board.IMAGE, "run `make firmware`"), (UF2, "run `make firmware`"),
                       (emulated_board.EMULATOR.parent / "node_modules", "run `make setup`")):
         if not path.exists():
             raise pytest.UsageError(f"{path} is missing: {how}")
@@ -38,21 +39,29 @@ def guest():
         yield running
 
 
-@pytest.fixture
-def emulated(guest):
+class Boards:
     """Starts emulated boards on the host, in step with the guest."""
-    started = []
 
-    def start(*arguments):
-        board = emulated_board.EmulatedBoard("--pace", "wall", *arguments, can=True)
-        started.append((board, Pacer(guest, board)))
+    def __init__(self, guest):
+        self.guest, self.pacers = guest, {}
+
+    def __call__(self, *arguments, **options):
+        board = emulated_board.EmulatedBoard("--pace", "wall", *arguments, can=True, **options)
+        self.pacers[board] = Pacer(self.guest, board)
         board.plug_usb().usb.close()  # it is up
         return board
 
-    yield start
-    for board, pacer in started:
-        pacer.close()
+    def end(self, board):
+        self.pacers.pop(board).close()
         board.__exit__()
+
+
+@pytest.fixture
+def emulated(guest):
+    boards = Boards(guest)
+    yield boards
+    for board in list(boards.pacers):
+        boards.end(board)
 
 
 class Bus:
@@ -136,13 +145,13 @@ def usb(guest, port):
     port.unplug()
 
 
-def settle(guest):
+def settle(guest, product="light stage sequencer"):
     """Until udev has done what it has to for a device that came."""
     for _ in range(1000):
         found = guest.run(["sh", "-c", "udevadm settle; cat /sys/bus/usb/devices/*/product"]).stdout
-        if "light stage sequencer" in found:
+        if product in found:
             return
-    raise TimeoutError("the board does not enumerate: " + guest.run(["dmesg"]).stdout[-2000:])
+    raise TimeoutError(f"no {product} enumerates: " + guest.run(["dmesg"]).stdout[-2000:])
 
 
 @pytest.fixture

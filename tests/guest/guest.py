@@ -113,7 +113,7 @@ class Guest:
         return ["nice", "-n", "5", "qemu-system-x86_64", "-machine", "q35", "-accel", "tcg,thread=multi", "-cpu", "max", "-smp", str(cpus),
                 "-m", str(memory_mb), "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
                 "-kernel", str(self.kernel / "vmlinux"), "-initrd", str(self.kernel / "initramfs"),
-                "-append", f"console=ttyS0 loglevel=4 panic=-1 -- {agent}", "-serial", "file:" + self._file("console"),
+                "-append", f"console=ttyS0 loglevel=4 panic=-1 no_timer_check -- {agent}", "-serial", "file:" + self._file("console"),
                 "-fsdev", "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap",
                 "-device", "virtio-9p-pci,fsdev=host,mount_tag=host",
                 "-qmp", f"unix:{self._file('qmp')},server=on,wait=off", "-netdev", "user,id=net", "-device", "virtio-net-pci,netdev=net,romfile="]

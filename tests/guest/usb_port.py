@@ -73,17 +73,24 @@ class UsbPort:
         self.device, self.connection = None, None
         self.pending, self.sizes = {}, {}
         self.plugged = 0
+        self.empty = threading.Event()
 
     def plug(self, device):
         """Plugs the device in; returns when the guest's hub has it."""
         self.device = device
         self.plugged += 1
+        self.empty = threading.Event()
         while self.process.input is None:
             self.process.wait_for("")
         self.process.input.sendall(b"plug\n")
         with self.process.changed:
             self.process.changed.wait_for(lambda: self.process.output.count("plugged") == self.plugged, 180)
         assert self.process.output.count("plugged") == self.plugged, self.process.errors
+
+    def wait_until_empty(self, process):
+        """Until the device has left by itself, as `process` in the guest is to bring it to."""
+        while not self.empty.wait(0.05):
+            assert process.returncode is None, process.output + process.errors
 
     def unplug(self):
         if self.device:
@@ -98,7 +105,7 @@ class UsbPort:
                 pass
 
     def _serve(self, connection):
-        self.connection, self.pending = connection, {}
+        self.connection, self.pending, empty = connection, {}, self.empty
         self.device.start(self._answer, self._hang_up)
         try:
             while True:
@@ -106,6 +113,7 @@ class UsbPort:
         except OSError:
             self.device.close()
         connection.close()
+        empty.set()
 
     def _take(self, header):
         command, number, _, direction, endpoint = struct.unpack_from(">5I", header)

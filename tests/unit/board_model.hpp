@@ -176,6 +176,12 @@ class ModelDevice : public UsbDevice {
     UsbResult read(std::span<uint8_t> buffer, uint32_t) override {
         return transfer([&] { return board_.loader ? board_.loader->read(buffer) : board_.firmware_read(buffer); });
     }
+    UsbResult clear_stalls() override {
+        return transfer([&] {
+            if (board_.loader) board_.loader->clear_stalls();
+            return UsbResult{UsbOutcome::done, 0};
+        });
+    }
 
   private:
     bool alive() const { return !dead_ && session_ == board_.session; }

@@ -11,6 +11,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "device/usb_device.hpp"
@@ -72,19 +73,14 @@ class LoaderModel {
     }
 
     UsbResult write(std::span<const uint8_t> bytes) {
-        if (halted_out_) return {UsbOutcome::stalled, 0};
-        switch (phase_) {
-            case Phase::command: return take_command(bytes);
-            case Phase::data_out: return take_data(bytes);
-            case Phase::acknowledge_out:
-                if (!bytes.empty()) break;
-                phase_ = Phase::command;
-                return {UsbOutcome::done, 0};
-            default: break;
-        }
-        violations++;
-        return {UsbOutcome::timed_out, 0};  // not acknowledged
+        if (!halted_out_ && std::exchange(is_out_of_step_, false)) return {UsbOutcome::done, bytes.size()};  // dropped
+        const UsbResult result = take(bytes);
+        if (result.outcome == UsbOutcome::stalled) is_out_of_step_ = true;
+        return result;
     }
+
+    // CLEAR_FEATURE(ENDPOINT_HALT) to both endpoints.
+    void clear_stalls() { halted_in_ = halted_out_ = is_out_of_step_ = false; }
 
     UsbResult read(std::span<uint8_t> buffer) {
         if (halted_in_) return {UsbOutcome::stalled, 0};
@@ -115,6 +111,21 @@ class LoaderModel {
         return {UsbOutcome::done, 32};
     }
     bool in_flash(uint32_t address) const { return address >= flash_begin && address < flash_end; }
+
+    UsbResult take(std::span<const uint8_t> bytes) {
+        if (halted_out_) return {UsbOutcome::stalled, 0};
+        switch (phase_) {
+            case Phase::command: return take_command(bytes);
+            case Phase::data_out: return take_data(bytes);
+            case Phase::acknowledge_out:
+                if (!bytes.empty()) break;
+                phase_ = Phase::command;
+                return {UsbOutcome::done, 0};
+            default: break;
+        }
+        violations++;
+        return {UsbOutcome::timed_out, 0};  // not acknowledged
+    }
 
     UsbResult take_command(std::span<const uint8_t> bytes) {
         if (bytes.size() != 32 || word(bytes, 0) != 0x431fd10b) {
@@ -217,6 +228,7 @@ class LoaderModel {
     FlashChip& flash_;
     Phase phase_ = Phase::command;
     bool halted_in_ = false, halted_out_ = false, rebooting_ = false;
+    bool is_out_of_step_ = false;  // a stall has begun the host's data toggle anew, as on xHCI, and not the chip's
     std::array<uint8_t, 16> status_{};
     uint32_t address_ = 0, size_ = 0, moved_ = 0;
 };

@@ -100,6 +100,7 @@ class ScriptedDevice : public UsbDevice {
         std::fill_n(buffer.begin(), result.bytes, uint8_t(0x55));
         return result;
     }
+    UsbResult clear_stalls() override { return {UsbOutcome::stalled, 0}; }
 
   private:
     std::vector<UsbResult> reads_;
@@ -131,6 +132,7 @@ class TricklingBus : public ModelBus {
                 buffer[0] = uint8_t(++bytes_);
                 return {UsbOutcome::done, 1};
             }
+            UsbResult clear_stalls() override { return {UsbOutcome::stalled, 0}; }
 
           private:
             size_t& bytes_;
