@@ -22,6 +22,7 @@ typedef uint32_t __attribute__((may_alias)) aliased_word;
 
 // By words where they are aligned: least significant byte first, as host and board have it.
 uint32_t ols_crc32(uint32_t crc, const void* bytes, size_t byte_count) {
+    if (byte_count == 0) return crc;  // of no bytes there may be no pointer
     const uint8_t* next = bytes;
     const uint8_t* const end = next + byte_count;
     crc = ~crc;

@@ -4,12 +4,10 @@ armed by a button on GPIO, the lamp nodes watched on CAN. Its targets are those 
 import base64
 import io
 import json
-import re
 import subprocess
 import sys
 import tarfile
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -36,6 +34,13 @@ bus = "can:vcan0"
 """
 
 
+def scene(folder):
+    """The spheres before the matte board: with single lamps nothing else tells one place in the cycle from the next."""
+    path = folder / "scene.toml"
+    path.write_text((ROOT / "tools/stagesim/scenes/spheres.toml").read_text() + "\n[board]\n")
+    return path
+
+
 def ring_of_lights():
     angles = 2 * np.pi * np.arange(LAMPS) / LAMPS
     return f"{LAMPS}\n" + "".join(f"lamp{n} {np.cos(a) / 2:.6f} {np.sin(a) / 2:.6f} {np.sqrt(0.75):.6f}\n" for n, a in enumerate(angles))
@@ -47,7 +52,7 @@ class TakeStage(VirtualStage):
     def __init__(self, folder):
         folder.mkdir()
         (folder / "lights.lp").write_text(ring_of_lights())
-        super().__init__(folder, "card.toml", "--no-board", stage=STAGE)
+        super().__init__(folder, scene(folder), "--no-board", stage=STAGE)
 
     def __enter__(self):
         while not (self.folder / "exposures.sock").exists():
@@ -142,23 +147,8 @@ def test_a_take_by_usb_v4l2_gpio_and_can_has_the_targets_of_one_over_socket_and_
     assert nodes == {0x200 + node for node in range(11)}
     archive = fetched(guest, tmp_path)
 
-    with VirtualStage(tmp_path / "ring", "card.toml", stage=SMALL_STAGE + f'[lamps]\nlp = "{tmp_path}/take/lights.lp"\n') as stage:
+    with VirtualStage(tmp_path / "ring", scene(tmp_path), stage=SMALL_STAGE + f'[lamps]\nlp = "{tmp_path}/take/lights.lp"\n') as stage:
         stage.stagectl("run", "--sequence", tmp_path / "sequence.toml", "--nominal", "--cycles", CYCLES, "-o", tmp_path / "ring.rfa")
     for target in range(CYCLES):
         ours, wanted = read_lamps(archive, target), read_lamps(tmp_path / "ring.rfa", target)
         assert wanted.size and np.array_equal(ours, wanted), target
-
-
-def test_a_board_that_is_unplugged_in_a_take_is_the_cause_of_what_is_missing_and_the_rest_is_kept(guest, usb, port, chip, run, tmp_path):
-    _, process = run(50)
-    chip.pull("ARM", True)
-    while guest.run(["test", "-e", "/tmp/take.rfa/cam0/target_000000.exr"]).returncode and process.returncode is None:
-        time.sleep(1)
-    port.unplug()
-    assert process.wait(300) == 1
-    assert re.search("unplugged", process.errors), process.errors
-    assert not chip.value("TALLY")
-    archive = fetched(guest, tmp_path)
-    manifest = json.loads((archive / "manifest.json").read_text())
-    assert set(manifest["extra"]["identification"]["causes"]) <= {"board_gone", "no_frame", "link_lost_it"}, manifest["extra"]
-    assert read_lamps(archive, 0).any()

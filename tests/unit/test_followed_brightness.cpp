@@ -51,8 +51,8 @@ TEST(FollowedBrightness, leaves_to_the_bit_what_changes_less_than_noise_may) {
     const double sigma = noise.read_counts + noise.shot * std::sqrt(1000.0);
     for (const auto& [is_moving, deviations] : {std::pair(true, 1.5f), std::pair(false, 6.0f)}) {
         const auto least = float(deviations * std::sqrt(2.0) * sigma);
-        const auto after = [&](float change) {
-            return followed<float>(1000, 1000, 1000 + change * least, 2, 123.25f, noise, is_moving);
+        const auto after = [&, moves = is_moving](float change) {
+            return followed<float>(1000, 1000, 1000 + change * least, 2, 123.25f, noise, moves);
         };
         EXPECT_EQ(after(0.99f), 123.25f);
         EXPECT_NE(after(1.01f), 123.25f);

@@ -449,7 +449,7 @@ TEST(Concatenation, is_the_sum_of_a_vector_and_the_bilinear_one_where_it_leads) 
                 const size_t p = size_t(y) * size_t(width) + size_t(x);
                 const double px = std::clamp(double(float(x) + a.u[p]), 0.0, width - 1.0);
                 const double py = std::clamp(double(float(y) + a.v[p]), 0.0, height - 1.0);
-                const auto bilinear = [&](const std::vector<float>& plane) {
+                const auto bilinear = [&, width = width, height = height](const std::vector<float>& plane) {
                     double value = 0;
                     for (int j = 0; j < height; ++j)
                         for (int i = 0; i < width; ++i)

@@ -93,7 +93,9 @@ std::vector<Point> trace_pixel(const View& view, int x, int y) {
     const int side = int(std::lround(std::sqrt(scene.samples)));
     std::vector<Point> points;
     // A pixel's own width, and more for a surface that tilts away.
-    const auto reach_m = [&](Float3 place) { return 3 * camera.pixel_angle() * length(place - camera.position()); };
+    const auto reach_m = [&](Float3 place) {
+        return 3 * view.camera.pixel_angle() * length(place - view.camera.position());
+    };
     for (int s = 0; s < scene.samples; ++s) {
         const Float3 ray = camera.ray(x + (s % side + 0.5) / side, y + (s / side + 0.5) / side);
         const auto hit = geometry.intersect(camera.position(), ray);

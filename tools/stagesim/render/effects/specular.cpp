@@ -47,7 +47,7 @@ uint32_t Specular::apply_packet(LightPacket& packet) const {
     }
     uint32_t evaluations = 0;
     for (int i = 0; i < packet_size; ++i) {
-        const bool counts = !(irradiance[i] <= 0) & !(f0[i] <= 0);
+        const bool counts = int(!(irradiance[i] <= 0)) & int(!(f0[i] <= 0));  // no branch: it is to be vectorised
         lobe[i] = counts ? lobe[i] : 0;
         evaluations += counts;
     }
