@@ -34,8 +34,9 @@ def changed(at, count, text):
     return {FLASH_START + n: image[n : n + PAGE_BYTES] for n in range(0, len(image), PAGE_BYTES)}
 
 
-OLD = changed(VERSION_AT, VERSION_BYTES, "0.0.0-old")
 VERSION = field(NEW, VERSION_AT, VERSION_BYTES).rstrip(b"\0").decode()
+OLD_VERSION = "9" * len(VERSION)  # hello has room for as much as the firmware was built with
+OLD = changed(VERSION_AT, VERSION_BYTES, OLD_VERSION)
 
 
 class Bench:
@@ -86,7 +87,7 @@ def flash(guest, *arguments):
 def test_a_running_board_leaves_is_written_and_runs_what_was_written(guest, emulated, bench, stagectl):
     board = bench.plug_firmware()
     settle(guest)
-    assert json.loads(stagectl("status", "--json", "--board", "usb:").stdout)["firmware"] == "0.0.0-old"
+    assert json.loads(stagectl("status", "--json", "--board", "usb:").stdout)["firmware"] == OLD_VERSION
     flashing = flash(guest, "--board", "usb:" + SERIAL)
     bench.port.wait_until_empty(flashing)
     emulated.end(board)

@@ -106,10 +106,10 @@ def loopback(guest):
 
 
 def expect_gaps_are_counted(frames, end):
-    """Of frames that came in order: whatever ids they leave out."""
+    """Of frames that came in order: whatever ids they leave out. vivid counts by its clock, and two frames of its start may have one id."""
     ids = [frame["id"] for frame in frames]
-    assert ids == sorted(set(ids))
-    assert end["missing_ids"] == ids[-1] - ids[0] + 1 - len(ids)
+    assert ids == sorted(ids)
+    assert end["missing_ids"] == ids[-1] - ids[0] + 1 - len(set(ids))
 
 
 FORMATS = [("GREY", "none", 8), ("Y10 ", "none", 10), ("Y12 ", "none", 12), ("Y16 ", "none", 16), ("RGGB", "rggb", 8),
