@@ -31,7 +31,7 @@ def test_a_take_without_faults_is_not_suspect(clean):
 def test_pictures_that_changed_places_under_right_stamps_are_named_and_left_out(tmp_path, clean):
     slot = BASIS[40]
     by = BASIS[47] - slot
-    extra, report, archive = take(tmp_path / "take", [{"kind": "swap_pictures", "trigger": CYCLE + slot, "by": by}])
+    extra, report, archive = take(tmp_path / "take", [{"kind": "swap_pictures", "trigger": CYCLE + slot, "by": by}], code=2)
     assert report["slots_missing"] == 0, "no other witness sees it"
     assert report["suspect_targets"] == 1
     (suspect,) = extra["suspect_targets"]
