@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tarfile
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from virtual_take import HEIGHT, SMALL_STAGE, WIDTH, VirtualStage, read_lamps  #
 COPY_RING = ROOT / "build/host/bin/copy_ring"
 DEVICE = "/dev/video10"
 # Frames are told from one another by their times, to a twentieth of a period, and a machine that emulates another stalls for milliseconds.
-LAMPS, RATE_HZ, CYCLES = 8, 2, 2
+LAMPS, RATE_HZ, CYCLES = 8, 1, 2
 SEQUENCE = f'basis = "single"\nframe_rate_hz = {RATE_HZ}\n'
 STAGE = SMALL_STAGE + """[lamps]
 lp = "lights.lp"
@@ -152,3 +153,17 @@ def test_a_take_by_usb_v4l2_gpio_and_can_has_the_targets_of_one_over_socket_and_
     for target in range(CYCLES):
         ours, wanted = read_lamps(archive, target), read_lamps(tmp_path / "ring.rfa", target)
         assert wanted.size and np.array_equal(ours, wanted), target
+
+
+def test_a_board_that_is_unplugged_in_a_take_is_the_cause_of_what_is_missing_and_the_rest_is_kept(guest, port, chip, run, tmp_path):
+    _, process = run(50)
+    chip.pull("ARM", True)
+    while guest.run(["test", "-e", "/tmp/take.rfa/cam0/target_000000.exr"]).returncode and process.returncode is None:
+        time.sleep(1)
+    port.unplug()
+    assert process.wait() == 2, process.errors
+    assert "unplugged" in process.errors and not chip.value("TALLY"), process.errors
+    report = json.loads(process.output)
+    assert report["board_end"]["cause"] == "board_gone", process.output
+    assert max(report["causes"], key=report["causes"].get) == "board_gone", process.output
+    assert read_lamps(fetched(guest, tmp_path), 0).any()
