@@ -249,8 +249,7 @@ class AravisCamera : public Camera {
 
 Result<std::unique_ptr<Camera>> open_aravis_camera(const std::string& name, uint32_t index) {
     auto library = std::make_shared<LibraryThread>();
-    auto link =
-        library->run([name] { return AravisLink::open(name); }, Camera::device_patience_ms, [] { return false; });
+    auto link = library->run([name] { return AravisLink::open(name); }, Camera::device_patience_ms);
     if (!link) return fail("the camera aravis:" + name + " gives no answer: check its power and cable");
     if (!link->ok()) return link->error();
     return std::unique_ptr<Camera>(std::make_unique<AravisCamera>(std::move(library), std::move(**link), index));

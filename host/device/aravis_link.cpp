@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Finding, opening and asking a camera. GigE Vision registers by the standard 2.0, chapter "Bootstrap registers".
 #include "device/aravis_link.hpp"
-#include "steady_clock.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -10,6 +9,8 @@
 
 #include <algorithm>
 #include <chrono>
+
+#include "steady_clock.hpp"
 
 namespace ols {
 

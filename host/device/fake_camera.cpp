@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The fake camera's exposures, by its rate and the machine's clock or by call.
 #include "device/fake_camera.hpp"
-#include "steady_clock.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +8,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+
+#include "steady_clock.hpp"
 
 namespace ols {
 

@@ -26,7 +26,8 @@ class LibraryThread {
 
     // What `call` returns; nothing when it has not within `patience_ms`, or when `give_up` turned true meanwhile.
     template <typename Call>
-    std::optional<std::invoke_result_t<Call>> run(Call call, int patience_ms, const std::function<bool()>& give_up) {
+    std::optional<std::invoke_result_t<Call>> run(
+        Call call, int patience_ms, const std::function<bool()>& give_up = [] { return false; }) {
         using Returned = std::invoke_result_t<Call>;
         const auto task = std::make_shared<std::packaged_task<Returned()>>(std::move(call));
         auto returned = task->get_future();

@@ -318,7 +318,7 @@ Result<std::unique_ptr<Camera>> make_v4l2_camera(std::shared_ptr<V4l2Device> dev
         const int error = device->ioctl(VIDIOC_QUERYCAP, &is);
         return std::pair(error, is);
     };
-    const auto told = calls.run(ask_what_it_is, patience_ms, [] { return false; });
+    const auto told = calls.run(ask_what_it_is, patience_ms);
     if (!told) return fail(does_not_open(name));
     const auto& [error, is] = *told;
     if (error != 0)
@@ -337,8 +337,7 @@ Result<std::unique_ptr<Camera>> open_v4l2_camera(const std::string& text, uint32
                     "' names no device: write v4l2:/dev/video0 or v4l2:0 (`v4l2-ctl --list-devices`)");
     const std::string path = is_number ? "/dev/video" + text : text;
     LibraryThread calls;
-    auto device =
-        calls.run([path] { return open_v4l2_device(path); }, Camera::device_patience_ms, [] { return false; });
+    auto device = calls.run([path] { return open_v4l2_device(path); }, Camera::device_patience_ms);
     if (!device) return fail(does_not_open("the camera v4l2:" + path));
     if (!device->ok()) return device->error();
     return make_v4l2_camera(std::move(**device), path, index);

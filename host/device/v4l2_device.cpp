@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The kernel's side of a V4L2 device.
 #include "device/v4l2_device.hpp"
-#include "steady_clock.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -15,6 +14,8 @@
 #include <chrono>
 #include <cstring>
 #include <filesystem>
+
+#include "steady_clock.hpp"
 
 namespace ols {
 

@@ -2,6 +2,7 @@
 """A whole take in the guest, by the kernel's own interfaces at once: the virtual stage's board on USB, its frames over V4L2, the take
 armed by a button on GPIO, the lamp nodes watched on CAN. Its targets are those of a take over the stage's own socket and ring."""
 import base64
+import contextlib
 import io
 import json
 import subprocess
@@ -115,24 +116,22 @@ def run(guest, emulated, usb, bus, chip, loopback, tmp_path):
     """Starts a take in the guest; returns its stage and stagectl, which waits for the button."""
     sequence = tmp_path / "sequence.toml"
     sequence.write_text(SEQUENCE)
-    opened = []
+    opened = contextlib.ExitStack()
 
     def start(cycles):
-        stage = TakeStage(tmp_path / "take").__enter__()
-        opened.append(stage)
-        opened.append(Frames(stage, loopback))
+        stage = opened.enter_context(TakeStage(tmp_path / "take"))
+        opened.enter_context(Frames(stage, loopback))
         board = emulated("--lamp-nodes", "--exposures", stage.folder / "exposures.sock")
         wires = bus(board)
         usb(board)
         process = guest.start([STAGECTL, "run", "--sequence", sequence, "--nominal", "--cycles", cycles, "--stage", stage.stage, "--board",
                                "usb:", "--camera", f"v4l2:{DEVICE}", "--arm", "--json", "-o", "/tmp/take.rfa"])
-        opened.append(process)
+        opened.callback(process.end)
         process.wait_for("waiting for the arm button")
         return wires, process
 
-    yield start
-    for one in reversed(opened):
-        one.end() if hasattr(one, "end") else one.__exit__()
+    with opened:
+        yield start
 
 
 def test_a_take_by_usb_v4l2_gpio_and_can_has_the_targets_of_one_over_socket_and_ring(guest, chip, run, tmp_path):

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Telemetry of lamp nodes from a bus that a test holds, in bytes as PROTOCOL.md draws them.
 // links: ols_device
-#include "comes_true.hpp"
 #include "device/lamp_nodes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <condition_variable>
 #include <deque>
+
+#include "comes_true.hpp"
 
 using namespace ols;
 using namespace ols::test;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The stage's lines over a chip that a test holds: what stops a take, what begins it, and which edges are known to be lost.
 // links: ols_device
-#include "comes_true.hpp"
 #include "device/stage_lines.hpp"
-#include "steady_clock.hpp"
 
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <random>
+
+#include "comes_true.hpp"
+#include "steady_clock.hpp"
 
 using namespace ols;
 using namespace ols::test;
