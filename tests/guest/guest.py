@@ -50,6 +50,8 @@ class Process:
                 else:
                     self.errors += decoder.decode(part)
                 self.changed.notify_all()
+        # QEMU's network keeps a connection until both ends are closed, and never answers a later one from the same port of the guest.
+        connection.close()
         with self.changed:
             self.open_streams -= 1
             self.changed.notify_all()

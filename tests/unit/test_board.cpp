@@ -108,6 +108,20 @@ TEST(Board, another_message_layout_is_refused_with_a_remedy_even_when_the_reply_
     EXPECT_NE(board.error().message.find("make flash"), std::string::npos);
 }
 
+TEST(Board, a_refusal_is_told_when_it_has_a_text_of_any_length_and_is_no_refusal_without_one) {
+    const ols_error_reply refusal{OLS_ERROR_NOT_SAFE, OLS_NO_SLOT, "the emergency stop is pressed"};
+    for (size_t bytes = 0; bytes <= sizeof refusal; ++bytes) {
+        Bytes sent = bytes_of(refusal);
+        sent.resize(bytes);
+        auto board = connect([&](uint16_t, const Bytes&) { return Answer{OLS_ERROR | OLS_REPLY, sent}; });
+        const auto status = board->status();
+        ASSERT_FALSE(status.ok());
+        const std::string text(refusal.text, strnlen(refusal.text, bytes > 4 ? bytes - 4 : 0));
+        const auto said = text.empty() ? fmt::format("answered message 0x7f with {} bytes", bytes) : "refused: " + text;
+        EXPECT_NE(status.error().message.find(said), std::string::npos) << status.error().message << " / " << said;
+    }
+}
+
 TEST(Board, a_program_arrives_whole_in_chunks_with_its_crc) {
     Bytes program(5000);
     for (size_t i = 0; i < program.size(); ++i) program[i] = uint8_t(i * 7 + i / 251);

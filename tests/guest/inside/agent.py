@@ -94,7 +94,9 @@ class Agent:
                 elif do == "unload":
                     unload(asked["module"])
                     self.tell(id=asked["id"])
-            except (KeyError, OSError, ValueError) as error:
+            except KeyError as error:
+                self.tell(id=asked["id"], error=f"the agent has no program {error} that has started")
+            except (OSError, ValueError) as error:
                 self.tell(id=asked["id"], error=str(error))
 
 
