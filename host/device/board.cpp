@@ -101,7 +101,8 @@ Board::Board(std::unique_ptr<Transfer> transfer, const Patience& patience)
 Error Board::refusal(std::span<const uint8_t> payload) const {
     ols_error_reply error{};
     if (payload.size() <= offsetof(ols_error_reply, text)) return wrong_length(OLS_ERROR, payload.size());
-    std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));  // other releases' texts differ in length
+    // The text of another release may be shorter or longer.
+    std::memcpy(&error, payload.data(), std::min(payload.size(), sizeof error));
     const std::string text = printable(error.text);
     if (error.slot == OLS_NO_SLOT) return says("refused: " + text);
     return says(fmt::format("refused: {} (slot {})", text, uint16_t(error.slot)));

@@ -22,6 +22,7 @@ namespace {
 
 constexpr size_t out_bytes_max = 16 * OLS_FRAME_BYTES_MAX;  // of one transfer
 constexpr size_t read_bytes = 64 << 10;
+constexpr std::chrono::seconds last_answer_kept{2};
 
 sockaddr_un address_of(const std::string& path) {
     sockaddr_un address{};
@@ -155,7 +156,14 @@ Result<std::unique_ptr<BoardRelay>> BoardRelay::listen(const std::string& path) 
 
 BoardRelay::BoardRelay(std::string path, int listener) : path_(std::move(path)), listener_(listener) {}
 
+// A client that has been answered, as one that stopped the board, may still fetch the answer.
 BoardRelay::~BoardRelay() {
+    const auto end = Client::Clock::now() + last_answer_kept;
+    while (client_ && !client_->output.empty() && Client::Clock::now() < end) {
+        pollfd asks{client_->fd, POLLIN, 0};
+        (void)::poll(&asks, 1, 10);
+        if (!client_->receive() || !client_->deliver()) client_.reset();
+    }
     ::close(listener_);
     ::unlink(path_.c_str());
 }

@@ -17,6 +17,7 @@ std::vector<SlotKind> kinds_of(const Sequence& sequence) {
 }
 
 const Reason off_grid = {Cause::not_proved, "its time fits no trigger"};
+const std::string in_the_dark = "dark, as the last tracking slot before it";
 
 }  // namespace
 
@@ -216,7 +217,6 @@ void FramePlacer::examine(Pending pending) {
         refuse_waiting({Cause::not_proved, "no landmark proved it before memory ran out"});
     if (sight == Sight::proves) {
         accept_waiting();
-        proved_ = true;
     } else if (sight == Sight::disagrees) {
         const bool no_light = code_.kind_at(counter) == SlotKind::tracking && is_dark(frame.summary);
         refuse_waiting(
@@ -224,14 +224,17 @@ void FramePlacer::examine(Pending pending) {
              fmt::format("the optical code disagrees: trigger {} {} a {} slot", counter,
                          no_light ? "is dark, and is" : "does not look like", slot_kind_name(code_.kind_at(counter)))});
         proved_ = false;
+        in_the_dark_ |= no_light;
     }
 }
 
 void FramePlacer::end_run() {
     if (proved_)
         accept_waiting();
+    else if (in_the_dark_)
+        refuse_waiting({Cause::no_light, in_the_dark});
     else
-        refuse_waiting({Cause::not_proved, "no landmark proves it: the camera's count broke before and after it"});
+        refuse_waiting({Cause::not_proved, "neither the landmark before it nor one after it proves it"});
     proved_ = false;
 }
 
@@ -247,13 +250,22 @@ void FramePlacer::end_stretch() {
     locked_ = false;
 }
 
+// Where there was no light, no frame is believed to have had any before one does: in the dark every slot looks dark.
 void FramePlacer::accept_waiting() {
     for (const Pending& pending : waiting_) {
         const FrameWitness& frame = pending.frame;
-        if (frame.unfit.empty() && code_.kind_at(counter_of(pending)) == SlotKind::basis)
-            code_.learn(counter_of(pending), frame.summary);
-        placements_.push_back({frame.arrival, counter_of(pending), frame.unfit.empty(), frame.unfit, pending.optical});
+        const uint64_t counter = counter_of(pending);
+        in_the_dark_ &= !frame.unfit.empty() || is_dark(frame.summary);
+        if (in_the_dark_) {
+            placements_.push_back({frame.arrival, counter, false,
+                                   frame.unfit.empty() ? Reason{Cause::no_light, in_the_dark} : frame.unfit,
+                                   pending.optical});
+            continue;
+        }
+        if (frame.unfit.empty() && code_.kind_at(counter) == SlotKind::basis) code_.learn(counter, frame.summary);
+        placements_.push_back({frame.arrival, counter, frame.unfit.empty(), frame.unfit, pending.optical});
     }
+    proved_ = !in_the_dark_;
     waiting_.clear();
 }
 

@@ -131,6 +131,8 @@ class FramePlacer {
     // The run.
     bool proved_ = false;  // its last landmark looked as it should
     std::vector<Pending> waiting_;
+
+    bool in_the_dark_ = false;  // a tracking slot was, and no frame since has had light
 };
 
 }  // namespace ols

@@ -153,6 +153,40 @@ def test_a_frozen_picture_without_noise_in_a_lit_landmark_takes_down_its_stretch
     expect_same(archive, whole, 2)
 
 
+def no_light(trigger, count=1 << 29):
+    """The lamps' supply is off, or a cap on the lens."""
+    return {"kind": "dim_lamp", "factor": 0.0, "trigger": trigger, "count": count}
+
+
+def last_tracking_before(trigger):
+    return max(n for n in range(trigger) if slots_of("single")[n % CYCLE]["kind"] == "tracking")
+
+
+def test_a_take_that_never_sees_light_keeps_nothing_and_says_to_look_at_supply_and_lens(tmp_path):
+    (tmp_path / "faults.toml").write_text('[[fault]]\nkind = "dim_lamp"\ntrigger = 0\nfactor = 0.0\n')
+    with VirtualStage(tmp_path / "work", "spheres.toml", "--inject", tmp_path / "faults.toml") as stage:
+        said = stage.stagectl("run", "--sequence", sequence("single"), "--nominal", "--cycles", CYCLES, "-o", tmp_path / "take.rfa", code=1)
+    assert f"{CYCLES * CYCLE} frames came, and none shows any light: check the lamps' supply, the lens and its cap" in said
+    assert not (tmp_path / "take.rfa").exists()
+
+
+def test_lamps_that_fail_for_a_while_are_the_cause_of_what_is_missing_and_of_nothing_else(tmp_path, clean):
+    first, count = STRUCK["basis"], 40
+    archive, report = record(tmp_path / "take", [no_light(first, count)], code=2)
+    # From the tracking slot before that proved the last frame on, to where light is seen again.
+    assert missing_triggers(archive) == set(range(last_tracking_before(first) + 1, first + count))
+    assert set(report["causes"]) == {"no_light", "not_proved"} and report["causes"]["no_light"] > report["causes"]["not_proved"]
+    expect_same(archive, clean, 0)
+    expect_same(archive, clean, 2)
+
+
+def test_lamps_that_fail_to_the_end_leave_what_was_proved_before(tmp_path, clean):
+    archive, report = record(tmp_path / "take", [no_light(2 * CYCLE)], code=2)
+    assert missing_triggers(archive) == set(range(last_tracking_before(2 * CYCLE) + 1, 3 * CYCLE))
+    assert report["causes"]["no_light"] >= CYCLE
+    expect_same(archive, clean, 0)
+
+
 def basis_slot(basis, nth=50):
     """A basis slot of the second cycle."""
     return CYCLE + next(i for i, slot in enumerate(slots_of(basis)) if slot["kind"] == "basis" and i > nth)

@@ -71,4 +71,12 @@ TEST(Causes, lamps_that_give_no_light_are_the_cause_and_not_the_camera) {
     const Outcome failed = play(take, stage.sequence);
     EXPECT_EQ(failed.notes.at(180).why.cause, Cause::no_light);
     EXPECT_EQ(failed.mislabelled, 0);
+    // For a while: the landmark after it proves the place of all that came, and not that there was light.
+    take = clean;
+    for (size_t n = 319; n < 359; ++n) take.frames[n].witness.summary = dark;
+    const Outcome back = play(take, stage.sequence);
+    for (uint64_t n = 319; n < 359; ++n) EXPECT_TRUE(back.missing.contains(n)) << n;
+    EXPECT_FALSE(back.missing.contains(359));
+    EXPECT_EQ(back.notes.at(358).why.cause, Cause::no_light);
+    EXPECT_EQ(back.mislabelled, 0);
 }

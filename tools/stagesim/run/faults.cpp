@@ -30,10 +30,12 @@ Result<std::vector<Fault>> read_faults(const std::string& path) {
                                         {"dim_lamp", FaultKind::dim_lamp},
                                         {"restart_camera", FaultKind::restart_camera}});
         int lamp = 0, count = 0;
-        section.read("lamp", lamp, 0, 65535);
+        if (section.has("lamp")) {
+            section.read("lamp", lamp, 0, 65535);
+            fault.lamp = size_t(lamp);
+        }
         section.read("factor", fault.factor, 0.0, 1.0);
         section.read("count", count, 1, 1 << 30);
-        fault.lamp = size_t(lamp);
         if (count > 0) fault.count = uint64_t(count);
         section.read("camera", camera, 0, 3);
         section.read("trigger", trigger, 0, 1 << 30);
@@ -58,10 +60,12 @@ const Fault* FaultyDelivery::find(FaultKind kind, uint64_t trigger) const {
 }
 
 void FaultyDelivery::dim(std::vector<double>& lit_us, uint64_t trigger) {
-    for (const Fault& fault : faults_)
-        if (fault.kind == FaultKind::dim_lamp && fault.lamp < lit_us.size() && trigger >= fault.trigger &&
-            trigger - fault.trigger < fault.count)
-            lit_us[fault.lamp] *= fault.factor;
+    for (const Fault& fault : faults_) {
+        if (fault.kind != FaultKind::dim_lamp || trigger < fault.trigger || trigger - fault.trigger >= fault.count)
+            continue;
+        for (size_t lamp = 0; lamp < lit_us.size(); ++lamp)
+            if (!fault.lamp || *fault.lamp == lamp) lit_us[lamp] *= fault.factor;
+    }
     constexpr size_t kept = 1024;
     const std::vector<double> own = lit_us;
     if (const Fault* old = find(FaultKind::old_light, trigger); old && old->by <= lit_before_.size())

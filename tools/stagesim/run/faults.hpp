@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -25,17 +26,17 @@ enum class FaultKind {
     freeze,          // the frame shows the picture of the one before
     swap_pictures,   // the frame and the one `by` later have each other's samples, under their own stamps
     old_light,       // the lamps show the pattern that they showed `by` triggers before
-    dim_lamp,        // a lamp gives `factor` of its light, of so many triggers (`count`)
+    dim_lamp,        // a lamp, or all, gives `factor` of its light, of so many triggers (`count`)
     restart_camera,  // before this trigger the camera starts anew: ids from 1, its clock kept or from 0
 };
 
 struct Fault {
     FaultKind kind;
     uint32_t camera = 0;
-    uint64_t trigger = 0;    // how many triggers this camera had before, from 0
-    uint64_t by = 1;         // late: frames; swap_pictures, old_light: triggers
-    bool keep_clock = true;  // restart_camera
-    size_t lamp = 0;         // dim_lamp
+    uint64_t trigger = 0;          // how many triggers this camera had before, from 0
+    uint64_t by = 1;               // late: frames; swap_pictures, old_light: triggers
+    bool keep_clock = true;        // restart_camera
+    std::optional<size_t> lamp{};  // dim_lamp: all if it names none
     double factor = 0;
     uint64_t count = uint64_t(1) << 40;
 };
