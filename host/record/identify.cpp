@@ -93,19 +93,23 @@ Reason Identifier::take_last_loss() {
     return why;
 }
 
+// A trigger has had its light once the board has fired the next, or has played to the end: a board that is stopped, faults or
+// is unplugged goes dark in the middle of a slot.
 void Identifier::match_log() {
     for (; !accepted_.empty(); accepted_.pop_front()) {
         const Accepted frame = accepted_.front();
+        if (frame.counter + 1 >= log_end_ && !log_ended_) return;
         const auto entry = log_.find(frame.counter);
-        if (entry != log_.end() && fits_program(entry->second)) {
+        const bool was_cut_off = frame.counter + 1 == log_end_ && log_ended_ && !log_ended_->empty();
+        if (entry != log_.end() && fits_program(entry->second) && !was_cut_off) {
             identified_[frame.counter] = true;
             verdicts_.push_back({Verdict::identified, frame.arrival, entry->second, {}, {}});
             continue;
         }
-        if (entry == log_.end() && frame.counter >= log_end_ && !log_ended_) return;
         MissingSlot& slot = note(frame.counter);
         slot.camera = true;
-        slot.why = entry != log_.end()
+        slot.why = was_cut_off ? Reason{log_ended_->cause, "its light may have been cut off: " + log_ended_->text}
+                   : entry != log_.end()
                        ? Reason{Cause::log_lost_it, "the trigger log has another slot or time than the program"}
                    : frame.counter < log_end_ ? Reason{Cause::log_lost_it, "the board's trigger log lost it"}
                    : log_ended_->empty()      ? Reason{Cause::board_did_not_fire, "the board did not fire it"}

@@ -10,7 +10,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from virtual_take import HEIGHT, WIDTH, VirtualStage, read_lamps, sequence, target_file, verify
+from virtual_take import HEIGHT, WIDTH, VirtualStage, missing_slots, read_lamps, sequence, target_file, verify
 
 CARD = 0.985
 
@@ -108,8 +108,10 @@ def test_ctrl_c_stops_the_light_and_finishes_the_archive(tmp_path):
         assert stage.stagectl("status", "--json", camera=False)["state"] != "playing"
     checked = verify(archive)
     assert checked.returncode == 0, checked.stdout
+    first, *_ = missing_slots(archive)
+    assert first["why"] == "its light may have been cut off: stopped by you" and first["count"] == 1
     # What was never played is one line, with the reason.
-    assert "to 1999: no frame of it was recorded: the take was stopped" in checked.stdout
+    assert "to 1999: no frame of it was recorded: stopped by you" in checked.stdout
     intact = sum(line.startswith("ok") for line in checked.stdout.splitlines())
     assert len(checked.stdout.splitlines()) < intact + 6, checked.stdout
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The board client against a scripted board that answers from protocol/frame.c, and against boards that misbehave.
 // links: ols_device
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cstring>

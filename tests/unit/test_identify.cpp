@@ -110,7 +110,8 @@ const Fault faults[] = {
          t.log.resize(n);
          t.log_end = {Cause::board_gone, "the board was reset"};
      },
-     [](const Sequence& s, uint64_t n) { return range(can_stand_alone(s, n) ? n : 0, s.trigger_count()); }},
+     // The light of the last trigger that it told of may have been cut off.
+     [](const Sequence& s, uint64_t n) { return range(can_stand_alone(s, n) ? n - 1 : 0, s.trigger_count()); }},
     // Stamps go on and pixels come one frame late: only the optical code can tell, and only at landmarks.
     {"pixels one frame behind their stamps",
      [](Take& t, uint64_t n) {
@@ -150,6 +151,22 @@ TEST_P(IdentifyFaults, leave_the_expected_slots_missing_in_every_kind_of_slot_an
 }
 
 INSTANTIATE_TEST_SUITE_P(Bases, IdentifyFaults, testing::Values("single", "s159", "hadamard156"));
+
+TEST(Identify, the_last_light_of_a_board_that_is_stopped_may_have_been_cut_off) {
+    SyntheticStage stage("single", 3);
+    Take take = record(stage);
+    const uint64_t last = find_slot(stage.sequence, SlotKind::basis, 1, 7);
+    take.frames.resize(last + 1);
+    take.log.resize(last + 1);
+    take.log_end = {Cause::stopped, "stopped by you"};
+    const Outcome stopped = play(take, stage.sequence);
+    EXPECT_EQ(stopped.missing, range(last, take.triggers));
+    EXPECT_EQ(stopped.notes.at(last).why, (Reason{Cause::stopped, "its light may have been cut off: stopped by you"}));
+    EXPECT_EQ(stopped.notes.at(last + 1).why, take.log_end);
+    // It fired once more, and that frame was lost: this one had all of its light.
+    take.log.push_back(record(stage).log[last + 1]);
+    EXPECT_EQ(play(take, stage.sequence).missing, range(last + 1, take.triggers));
+}
 
 TEST(Identify, a_camera_that_is_gone_is_why_its_later_frames_are_missing_and_not_why_an_earlier_one_is) {
     SyntheticStage stage("single", 3);
