@@ -75,8 +75,11 @@ TEST(Causes, lamps_that_give_no_light_are_the_cause_and_not_the_camera) {
     take = clean;
     for (size_t n = 319; n < 359; ++n) take.frames[n].witness.summary = dark;
     const Outcome back = play(take, stage.sequence);
-    for (uint64_t n = 319; n < 359; ++n) EXPECT_TRUE(back.missing.contains(n)) << n;
-    EXPECT_FALSE(back.missing.contains(359));
+    uint64_t seen_again = 359;
+    while (is_dark(take.frames[seen_again].witness.summary)) ++seen_again;
+    EXPECT_LT(seen_again, 364) << "lamps in a row behind the subject";
+    for (uint64_t n = 319; n < seen_again; ++n) EXPECT_TRUE(back.missing.contains(n)) << n;
+    EXPECT_FALSE(back.missing.contains(seen_again));
     EXPECT_EQ(back.notes.at(358).why.cause, Cause::no_light);
     EXPECT_EQ(back.mislabelled, 0);
 }
