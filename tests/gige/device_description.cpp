@@ -74,7 +74,7 @@ class Description {
 
     std::string xml() const {
         return R"(<?xml version="1.0" encoding="utf-8"?><RegisterDescription ModelName="Line" VendorName="OLS" )"
-               R"(StandardNameSpace="GEV" SchemaMajorVersion="1" SchemaMinorVersion="1" SchemaSubMinorVersion="0" )"
+               R"(StandardNameSpace="None" SchemaMajorVersion="1" SchemaMinorVersion="1" SchemaSubMinorVersion="0" )"
                R"(MajorVersion="1" MinorVersion="0" SubMinorVersion="0" ToolTip="" ProductGuid="0" VersionGuid="0" )"
                R"(xmlns="http://www.genicam.org/GenApi/Version_1_1"><Category Name="Root">)" +
                names_ + "</Category>" + nodes_ + R"(<Port Name="Device"/></RegisterDescription>)";
@@ -105,9 +105,10 @@ class Description {
 std::string device_description(const DescriptionOptions& options) {
     Description d(options);
     const std::string step = fmt::format("<Inc>{}</Inc>", options.width_step);
-    d.text("DeviceVendorName", 0x48, 32);
-    d.text("DeviceModelName", 0x68, 32);
-    d.text("DeviceSerialNumber", 0xd8, 16);
+    // Bootstrap registers: GenCP 1.1, "Technology agnostic bootstrap register map"; GigE Vision 2.0.
+    d.text("DeviceVendorName", options.is_usb ? 0x04 : 0x48, options.is_usb ? 64 : 32);
+    d.text("DeviceModelName", options.is_usb ? 0x44 : 0x68, options.is_usb ? 64 : 32);
+    d.text("DeviceSerialNumber", options.is_usb ? 0x144 : 0xd8, options.is_usb ? 64 : 16);
     d.integer("Width", reg_width, "<Min>8</Min><pMax>WidthMax</pMax>" + step);
     d.integer("Height", reg_height, "<Min>2</Min><pMax>HeightMax</pMax>");
     d.integer("OffsetX", reg_offset_x, "<Min>0</Min><pMax>WidthMax</pMax>" + step);
@@ -142,6 +143,7 @@ std::string device_description(const DescriptionOptions& options) {
     d.choice("ChunkSelector", reg_chunk_selector, {{"Image", 0}, {"Timestamp", 1}});
     d.flag("ChunkEnable", reg_chunk_enable);
     d.chunk_time();
+    if (options.is_usb) return d.xml();
     // Of the transport (GigE Vision 2.0, stream channel packet size register): that there is a test packet, and the limits.
     d.integer("GevSCPSPacketSize", 0x0d04,
               fmt::format("<Min>576</Min><Max>{}</Max><Inc>4</Inc>", options.packet_size_max));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The GenICam description (GenApi 1.1 schema) of GigeDevice's features, and where their registers lie.
+// The GenICam description (GenApi 1.1 schema) of our cameras' features, and where their registers lie: GigeDevice's, and those of the
+// USB3 Vision camera of the guest's tests.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,8 @@
 
 namespace ols::test {
 
-// Registers of features; four bytes each, floats and times eight. Big-endian, as GigE Vision's are.
+// Registers of features; four bytes each, floats and times eight. Big-endian, as GigE Vision's are; on USB3 Vision a description may
+// say so, too.
 enum FeatureRegister : uint32_t {
     reg_width = 0x10000,
     reg_height = 0x10004,
@@ -46,6 +48,7 @@ struct DescriptionOptions {
     std::set<std::string> lacks;          // features that this model does not have
     std::set<std::string> pixel_formats;  // that it has; all when empty
     int width_step = 1, packet_size_max = 9000;
+    bool is_usb = false;  // USB3 Vision's bootstrap registers, and nothing of GigE's transport
 };
 std::string device_description(const DescriptionOptions& options);
 

@@ -10,12 +10,13 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "tests/hil")]
 
 import kernel  # noqa: E402
+from camera_program import CameraProgram  # noqa: E402
 from can_join import CanJoin  # noqa: E402
 from gpio_chip import Chip  # noqa: E402
 from guest import Guest  # noqa: E402
 from ols_board import board as emulated_board  # noqa: E402
 from pacer import Pacer  # noqa: E402
-from usb_port import BoardCable, UsbPort  # noqa: E402
+from usb_port import SUPER_SPEED, BoardCable, UsbPort  # noqa: E402
 
 STAGECTL = ROOT / "build/host/bin/stagectl"
 UF2 = ROOT / "build/firmware/stage.uf2"
@@ -125,11 +126,21 @@ def bus(guest, buses):
 
 
 @pytest.fixture(scope="session")
-def port(guest):
-    """The guest's USB port, with udev at work as on a desktop, and no rules of ours."""
-    made = UsbPort(guest, INSIDE)
+def udev(guest):
+    """At work as on a desktop, and no rules of ours."""
     guest.run(["/lib/systemd/systemd-udevd", "--daemon"])
-    return made
+
+
+@pytest.fixture(scope="session")
+def port(guest, udev):
+    """The guest's USB port."""
+    return UsbPort(guest, INSIDE)
+
+
+@pytest.fixture(scope="session")
+def fast_ports(guest, udev):
+    """Two ports of SuperSpeed."""
+    return [UsbPort(guest, INSIDE, number, SUPER_SPEED) for number in range(2)]
 
 
 @pytest.fixture
@@ -145,13 +156,13 @@ def usb(guest, port):
     port.unplug()
 
 
-def settle(guest, product="light stage sequencer"):
-    """Until udev has done what it has to for a device that came."""
+def settle(guest, name="light stage sequencer"):
+    """Until udev has done what it has to for a device that came, of that product or serial number."""
     for _ in range(1000):
-        found = guest.run(["sh", "-c", "udevadm settle; cat /sys/bus/usb/devices/*/product"]).stdout
-        if product in found:
+        found = guest.run(["sh", "-c", "udevadm settle; cd /sys/bus/usb/devices; cat */product */serial"]).stdout
+        if name in found.splitlines():
             return
-    raise TimeoutError(f"no {product} enumerates: " + guest.run(["dmesg"]).stdout[-2000:])
+    raise TimeoutError(f"no {name} enumerates: " + guest.run(["dmesg"]).stdout[-2000:])
 
 
 @pytest.fixture
@@ -169,3 +180,17 @@ def stagectl(guest):
         return guest.run([STAGECTL, *arguments], **options)
 
     return run
+
+
+@pytest.fixture
+def camera(guest):
+    """Starts cameras, as CameraProgram does, and ends them before their devices go."""
+    started = []
+
+    def start(*arguments, **options):
+        started.append(CameraProgram(guest, *arguments, **options))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.process.end()

@@ -61,14 +61,18 @@ class BoardCable:
             pass
 
 
-class UsbPort:
-    """One port of the guest's USB."""
+FULL_SPEED, SUPER_SPEED = 2, 5  # usb_device_speed of include/uapi/linux/usb/ch9.h
 
-    def __init__(self, guest, inside):
+
+class UsbPort:
+    """One port of the guest's USB; `speed` is that of whatever is plugged in."""
+
+    def __init__(self, guest, inside, number=0, speed=FULL_SPEED):
         self.guest = guest
         guest.load("vhci-hcd")
-        guest.channel("usb", self._serve)
-        self.process = guest.start([sys.executable, inside / "usb_port.py", "usb"])
+        channel = f"usb{speed}.{number}"
+        guest.channel(channel, self._serve)
+        self.process = guest.start([sys.executable, inside / "usb_port.py", channel, number, speed])
         self.lock = threading.Lock()
         self.device, self.connection = None, None
         self.pending, self.sizes = {}, {}

@@ -2,7 +2,7 @@
 """A port of the guest's USB (vhci-hcd). For each line on standard input a device is plugged in: its transfers go to the tests, as
 USB/IP's messages after its import (Linux, Documentation/usb/usbip_protocol.rst). The device is unplugged when they hang up.
 
-usage: usb_port.py CHANNEL
+usage: usb_port.py CHANNEL NUMBER SPEED
 """
 import pathlib
 import sys
@@ -10,22 +10,24 @@ import sys
 from host import channel
 
 HUB = pathlib.Path("/sys/devices/platform/vhci_hcd.0")
-PORT, FULL_SPEED, DEVICE = 0, 2, 1  # usb_device_speed of include/uapi/linux/usb/ch9.h
+DEVICE, SUPER_SPEED = 1, 5  # usb_device_speed of include/uapi/linux/usb/ch9.h
 FREE = 4  # VDEV_ST_NULL, told by status
 
 
-def is_free():
-    """Whether the hub has let go of what was plugged in before."""
-    line = (HUB / "status").read_text().splitlines()[1 + PORT].split()
-    return int(line[2]) == FREE
+def ports(hub):
+    """Of the hub "hs" or "ss": (number among all ports, state)."""
+    lines = [line.split() for line in (HUB / "status").read_text().splitlines()[1:]]
+    return [(int(line[1]), int(line[2])) for line in lines if line[0] == hub]
 
 
 def main():
+    number, speed = int(sys.argv[2]), int(sys.argv[3])
+    hub = "ss" if speed == SUPER_SPEED else "hs"
     for _ in sys.stdin:
-        while not is_free():
-            pass
+        while ports(hub)[number][1] != FREE:
+            pass  # the hub has not let go of what was plugged in before
         with channel(sys.argv[1]) as far:
-            (HUB / "attach").write_text(f"{PORT} {far.fileno()} {DEVICE} {FULL_SPEED}")
+            (HUB / "attach").write_text(f"{ports(hub)[number][0]} {far.fileno()} {DEVICE} {speed}")
         print("plugged", flush=True)
 
 
