@@ -68,7 +68,7 @@ class AravisCamera : public Camera {
             AravisFeatures features(link->device());
             return set_up_camera(features, name, wanted);
         });
-        if (!set_up.ok()) return set_up.error();
+        if (!set_up.ok()) return why_gone().value_or(set_up.error());
         const std::lock_guard lock(mutex_);
         setup_ = *set_up;
         return Done{};
@@ -77,7 +77,7 @@ class AravisCamera : public Camera {
     Result<uint64_t> start() override {
         const uint64_t stops = stops_;
         halt();
-        if (const CameraState now = state(); now.kind == CameraState::gone) return fail(now.why);
+        if (const auto gone = why_gone()) return *gone;
         const AravisSetup setup = [this] {
             const std::lock_guard lock(mutex_);
             return setup_;
@@ -89,7 +89,7 @@ class AravisCamera : public Camera {
         if (begun.ok() && stops_ != stops) begun = fail(stopped_text());
         if (!begun.ok()) {
             halt();
-            return begun.error();
+            return why_gone().value_or(begun.error());
         }
         const std::lock_guard lock(mutex_);
         acquisition_ = std::move(begun->first);
@@ -119,7 +119,10 @@ class AravisCamera : public Camera {
                 if (frame) return frame;
             }
             if (steady_ns() >= until_ns || running() != acquisition) return std::nullopt;
-            if (!buffer && state().kind != CameraState::live) return std::nullopt;
+            if (!buffer && state().kind != CameraState::live) {
+                if (link_->is_lost()) halt();  // Aravis asks a USB3 camera that has gone without a pause
+                return std::nullopt;
+            }
         }
     }
 
@@ -197,7 +200,9 @@ class AravisCamera : public Camera {
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
         Frame frame;
-        const auto kind = acquisition.frames->read(buffer, frame);
+        auto kind = acquisition.frames->read(buffer, frame);
+        if (kind == AravisFrames::Kind::whole && acquisition.stream->is_disowned(buffer))
+            kind = AravisFrames::Kind::incomplete;
         underrun_ += kind == AravisFrames::Kind::incomplete;
         incomplete_ += kind == AravisFrames::Kind::incomplete;
         if (kind != AravisFrames::Kind::whole) return std::nullopt;
@@ -214,6 +219,11 @@ class AravisCamera : public Camera {
         const uint64_t unplaced = stream.unplaced();
         if (gap > 0 && unplaced != unplaced_) dropped_ += uint64_t(std::max<int64_t>(gap - int64_t(incomplete_), 0));
         if (gap > 0) unplaced_ = unplaced, incomplete_ = 0;
+    }
+
+    std::optional<Error> why_gone() const {
+        const CameraState now = state();
+        return now.kind == CameraState::gone ? std::optional(fail(now.why)) : std::nullopt;
     }
 
     std::string stopped_text() const { return name_ + " was stopped while it was started"; }

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "device/usb_cameras.hpp"
 #include "steady_clock.hpp"
 
 namespace ols {
@@ -53,6 +54,7 @@ Result<std::string> choose_camera(const std::string& name) {
         list +=
             fmt::format("{}aravis:{} ({} {})", list.empty() ? "" : ", ", camera.serial, camera.vendor, camera.model);
     if (name.empty()) {
+        if (const auto problem = found.empty() ? forbidden_usb_camera() : std::nullopt) return fail(*problem);
         if (found.empty())
             return fail(
                 "there is no GigE Vision or USB3 Vision camera: check its power and cable, for GigE that the computer "
@@ -84,6 +86,13 @@ void note_loss(ArvDevice*, std::atomic<bool>* is_lost) {
     *is_lost = true;
 }
 
+// As many as belong to frames of that size; says how many.
+std::string give_buffers(AravisStream& stream, size_t frame_bytes, size_t buffer_bytes) {
+    const size_t buffers = std::clamp(buffers_bytes / frame_bytes, buffers_min, buffers_max);
+    for (size_t n = 0; n < buffers; ++n) stream.give_back(arv_buffer_new_allocate(buffer_bytes));
+    return fmt::format("{} buffers of {} bytes", buffers, frame_bytes);
+}
+
 // Packets do not come by the packet socket on the loopback.
 void choose_socket(ArvGvDevice* device) {
     GSocketAddress* address = arv_gv_device_get_device_address(device);
@@ -113,6 +122,11 @@ bool AravisStream::is_filled(ArvBuffer* buffer) {
     return arv_buffer_get_frame_id(buffer) != no_frame;
 }
 
+bool AravisStream::is_disowned(ArvBuffer* buffer) const {
+    const auto* const data = static_cast<const uint8_t*>(arv_buffer_get_data(buffer, nullptr));
+    return trailer_at_ > 0 && usb_trailer_complains(data + trailer_at_, arv_buffer_get_frame_id(buffer));
+}
+
 bool AravisStream::has_waiting() const {
     int empty = 0, full = 0;
     arv_stream_get_n_buffers(stream_.get(), &empty, &full);
@@ -134,14 +148,20 @@ Result<std::shared_ptr<AravisLink>> AravisLink::open(const std::string& name) {
     if (!id.ok()) return id.error();
     LibraryError error;
     ObjectPointer<ArvDevice> device(arv_open_device(id->c_str(), error.out()));
-    if (!device)
-        return fail(fmt::format("the camera aravis:{} cannot be opened: {}; `arv-tool-0.8` lists those there are", name,
-                                error ? error.message() : "there is none of that serial number, id or address"));
-    if (ARV_IS_GV_DEVICE(device.get()) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get())))
+    const bool is_in_use =
+        device ? ARV_IS_GV_DEVICE(device.get()) && !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get()))
+               : error.message().ends_with("LIBUSB_ERROR_BUSY");
+    if (is_in_use)
         return fail("the camera aravis:" + name +
                     " is in use: another program controls it; end that one, or wait some seconds for the camera to let "
                     "go of one "
                     "that crashed");
+    if (!device) {
+        const auto problem = forbidden_usb_camera();
+        return fail(fmt::format("the camera aravis:{} cannot be opened: {}; `arv-tool-0.8` lists those there are{}",
+                                name, error ? error.message() : "there is none of that serial number, id or address",
+                                problem ? "; " + *problem : ""));
+    }
     return std::shared_ptr<AravisLink>(new AravisLink(std::move(device)));
 }
 
@@ -164,27 +184,41 @@ AravisLink::~AravisLink() {
 }
 
 Result<std::unique_ptr<AravisStream>> AravisLink::make_stream(std::string& chosen) {
+    if (!is_gige()) return make_usb_stream(chosen);
     const auto payload = AravisFeatures(device_.get()).integer("PayloadSize");
     if (!payload || *payload <= 0) return fail(name_ + " does not say how large its frames are (PayloadSize)");
-    const size_t buffers = std::clamp(buffers_bytes / size_t(*payload), buffers_min, buffers_max);
     LibraryError error;
-    if (is_gige()) arv_gv_device_auto_packet_size(ARV_GV_DEVICE(device_.get()), error.out());
+    arv_gv_device_auto_packet_size(ARV_GV_DEVICE(device_.get()), error.out());
     ArvStream* made = arv_device_create_stream(device_.get(), nullptr, nullptr, error.out());
     if (!made) return fail(name_ + " gives no stream of frames: " + error.message());
     auto stream = std::make_unique<AravisStream>(ObjectPointer<ArvStream>(made));
-    chosen = fmt::format("{} buffers of {} bytes", buffers, *payload);
-    if (is_gige()) {
-        g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes,
-                     "packet-request-ratio", asked_again, nullptr);
-        ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
-        g_object_get(made, "packet-resend", &resend, nullptr);
-        chosen =
-            fmt::format("packets of {} bytes, {}, {}, socket buffer of {} KiB",
-                        arv_gv_device_get_packet_size(ARV_GV_DEVICE(device_.get()), error.out()),
-                        resend == ARV_GV_STREAM_PACKET_RESEND_ALWAYS ? "lost ones asked for again" : "lost ones lost",
-                        chosen, granted_socket_bytes() / 1024);
-    }
-    for (size_t n = 0; n < buffers; ++n) stream->give_back(arv_buffer_new_allocate(size_t(*payload)));
+    g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes,
+                 "packet-request-ratio", asked_again, nullptr);
+    ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
+    g_object_get(made, "packet-resend", &resend, nullptr);
+    chosen = fmt::format("packets of {} bytes, {}, {}, socket buffer of {} KiB",
+                         arv_gv_device_get_packet_size(ARV_GV_DEVICE(device_.get()), error.out()),
+                         resend == ARV_GV_STREAM_PACKET_RESEND_ALWAYS ? "lost ones asked for again" : "lost ones lost",
+                         give_buffers(*stream, size_t(*payload), size_t(*payload)), granted_socket_bytes() / 1024);
+    return stream;
+}
+
+// Aravis 0.8.26 (arvuvstream.c) divides by the size that the device requires, also by none; it believes a frame of that size, whatever
+// the trailer says. It reads the trailer into what a buffer has left behind the payload; one that the payload's last transfer would
+// fill has to have nothing left.
+Result<std::unique_ptr<AravisStream>> AravisLink::make_usb_stream(std::string& chosen) {
+    const auto before = usb_stream_registers(device_.get());
+    if (!before || before->required_payload_bytes == 0)
+        return fail(name_ + " does not say how large its frames are (SI required payload size)");
+    LibraryError error;
+    ObjectPointer<ArvStream> made(arv_device_create_stream(device_.get(), nullptr, nullptr, error.out()));
+    if (!made) return fail(name_ + " gives no stream of frames: " + error.message());
+    const auto set = usb_stream_registers(device_.get()).value_or(UsbStreamRegisters{});
+    const size_t payload = before->required_payload_bytes, trailer = set.trailer_transfer_bytes;
+    const bool sees_trailer =
+        set.payload_transfer_bytes == payload && trailer >= usb_trailer_head_bytes && trailer <= payload;
+    auto stream = std::make_unique<AravisStream>(std::move(made), sees_trailer ? payload : 0);
+    chosen = give_buffers(*stream, payload, payload + (sees_trailer ? trailer : 0));
     return stream;
 }
 

@@ -14,21 +14,26 @@ uint64_t ticks_to_ns(uint64_t ticks, uint64_t ticks_hz);
 // Buffers that are filled, and frames that were lost for lack of one.
 class AravisStream {
   public:
-    explicit AravisStream(ObjectPointer<ArvStream> stream) : stream_(std::move(stream)) {}
+    // USB3 Vision: each frame's trailer lies in its buffer behind so many bytes; 0 where it does not.
+    explicit AravisStream(ObjectPointer<ArvStream> stream, size_t trailer_at = 0)
+        : stream_(std::move(stream)), trailer_at_(trailer_at) {}
 
     // The next buffer that is done with, or nullptr within `timeout_ms`; give it back. From any thread, as all below.
     ArvBuffer* take(int timeout_ms);
     void give_back(ArvBuffer* buffer);
     // Whether the buffer holds a frame: Aravis gives out again, as it was, one that it could not begin to fill.
     static bool is_filled(ArvBuffer* buffer);
+    // Whether the device says of the frame that it is not as it was exposed.
+    bool is_disowned(ArvBuffer* buffer) const;
 
     bool has_waiting() const;
-    // So many packets found no buffer to go to, since the stream began; USB3 streams do not count them.
+    // So many packets, of USB3 frames, found no buffer to go to, since the stream began.
     uint64_t unplaced() const;
     uint64_t resent_packets() const;
 
   private:
     ObjectPointer<ArvStream> stream_;
+    size_t trailer_at_;
 };
 
 // Made, used and let go in one thread, but for what says otherwise.
@@ -61,6 +66,7 @@ class AravisLink {
 
   private:
     explicit AravisLink(ObjectPointer<ArvDevice> device);
+    Result<std::unique_ptr<AravisStream>> make_usb_stream(std::string& chosen);
     std::optional<uint64_t> latched_ns();
 
     ObjectPointer<ArvDevice> device_;

@@ -36,14 +36,6 @@ UsbOutcome outcome_of(int code) {
     }
 }
 
-// udev(7): where rules lie.
-bool has_udev_rule() {
-    for (const char* folder : {"/etc/udev/rules.d", "/run/udev/rules.d", "/usr/local/lib/udev/rules.d",
-                               "/usr/lib/udev/rules.d", "/lib/udev/rules.d"})
-        if (::access((std::string(folder) + "/60-open-light-stage.rules").c_str(), F_OK) == 0) return true;
-    return false;
-}
-
 std::string open_problem(int code, libusb_device* device) {
     const auto where = fmt::format("the USB device at bus {} address {}", libusb_get_bus_number(device),
                                    libusb_get_device_address(device));
@@ -252,6 +244,14 @@ class LibusbBus : public UsbBus {
 };
 
 }  // namespace
+
+// udev(7): where rules lie.
+bool has_udev_rule() {
+    for (const char* folder : {"/etc/udev/rules.d", "/run/udev/rules.d", "/usr/local/lib/udev/rules.d",
+                               "/usr/lib/udev/rules.d", "/lib/udev/rules.d"})
+        if (::access((std::string(folder) + "/60-open-light-stage.rules").c_str(), F_OK) == 0) return true;
+    return false;
+}
 
 Result<std::unique_ptr<UsbBus>> open_usb_bus() {
     libusb_context* raw = nullptr;

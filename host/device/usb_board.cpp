@@ -79,13 +79,12 @@ std::string usb_permission_text(const std::string& where, bool has_rule) {
         return fmt::format(
             "no permission for {}: the udev rule 60-open-light-stage.rules is installed, and gives it to who is logged "
             "in at this "
-            "machine and to the group plugdev: sudo usermod -aG plugdev $USER, log in again and plug the board in "
-            "again",
+            "machine and to the group plugdev: sudo usermod -aG plugdev $USER, log in again and plug it in again",
             where);
     return fmt::format(
         "no permission for {}: install the udev rule 60-open-light-stage.rules, from the source folder: "
         "sudo install -m 644 host/device/60-open-light-stage.rules /etc/udev/rules.d/ && sudo udevadm control --reload "
-        "(`sudo make install` brings it, too), then plug the board in again",
+        "(`sudo make install` brings it, too), then plug it in again",
         where);
 }
 

@@ -63,6 +63,7 @@ class UsbBus {
 
 // What to do about a device `where` that may not be opened; `has_rule`: the udev rule is installed.
 std::string usb_permission_text(const std::string& where, bool has_rule);
+bool has_udev_rule();
 
 // The machine's own USB, by libusb. It sees devices that come later only where udev runs; a bus that is opened anew sees all.
 Result<std::unique_ptr<UsbBus>> open_usb_bus();

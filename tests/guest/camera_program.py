@@ -10,7 +10,7 @@ READ_CAMERA = pathlib.Path(__file__).resolve().parents[2] / "build/host/bin/read
 class CameraProgram:
     """`camera` has the keys of the stage's [[camera]]."""
 
-    def __init__(self, guest, source, frames, saved="/dev/null", pause=-1, user=None, groups=(), **camera):
+    def __init__(self, guest, source, frames, saved="/dev/null", pause="", user=None, groups=(), **camera):
         self.guest, self.saved = guest, saved
         text = "[[camera]]\n" + "".join(f"{key} = {value}\n" for key, value in camera.items())
         guest.run(["sh", "-c", f"cat > /tmp/stage.toml <<'END'\n{text}END"])

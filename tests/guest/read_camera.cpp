@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Reads a camera through its driver and says what came, a line of JSON each: for tests that look at a driver from outside.
 //
-// usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE_AFTER]]
+// usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE]]
 // Sets the camera up as the stage's first [[camera]] says, starts it, and ends after so many frames, or with that of the id. SAVED
-// gets their samples. It waits for a line of standard input after so many frames; of 0, before the set-up.
+// gets their samples. It waits for a line of standard input after PAUSE frames; of 0, before the set-up; "start" is before the start,
+// "end" when no more frames are read.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -39,17 +40,21 @@ int refuse(const Error& error) {
 }
 
 int read_camera(int argc, char** argv) {
-    if (argc < 4) return refuse(fail("usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE_AFTER]]"));
+    if (argc < 4) return refuse(fail("usage: read_camera STAGE.toml SOURCE FRAMES|@ID [SAVED [PAUSE]]"));
     const auto stage = read_stage(argv[1]);
     if (!stage.ok()) return refuse(stage.error());
     auto camera = open_camera(argv[2]);
     if (!camera.ok()) return refuse(camera.error());
     say({{"opened", (*camera)->info().name}});
-    const int pause_after = argc > 5 ? std::atoi(argv[5]) : -1;
-    std::string line;
-    if (pause_after == 0) std::getline(std::cin, line);
+    const std::string pause = argc > 5 ? argv[5] : "";
+    const auto pause_at = [&](const std::string& point) {
+        std::string line;
+        if (pause == point) std::getline(std::cin, line);
+    };
+    pause_at("0");
     const CameraSetup& setup = stage->cameras.at(0);
     if (const Status fits = (*camera)->set_up(setup); !fits.ok()) return refuse(fits.error());
+    pause_at("start");
     const auto started_ns = (*camera)->start();
     if (!started_ns.ok()) return refuse(started_ns.error());
     say({{"started_ns", *started_ns}, {"link", (*camera)->info().link}});
@@ -66,8 +71,9 @@ int read_camera(int argc, char** argv) {
              {"first", samples[0]},
              {"last", samples[frame->samples.size() / 2 - 1]}});
         id = frame->stamp.frame_id;
-        if (++n == uint64_t(pause_after)) std::getline(std::cin, line);
+        pause_at(std::to_string(++n));
     }
+    pause_at("end");
     saved.flush();
     say(end_of(**camera));
     return saved.good() ? 0 : refuse(fail(fmt::format("cannot write '{}'", argv[4])));

@@ -55,7 +55,7 @@ class U3vCamera:
                 self.registers[name] = value
         self.is_acquiring, self.next_id, self.last_ns = False, 0, 0
         self.pending_ms = {}  # how long a write to a register of that name takes; it is announced
-        self.refused = []  # commands: (status, address)
+        self.written, self.refused = [], []  # registers' names; of commands (status, address)
         self.answers = True  # on its control channel
         self.requires_payload = True  # says how large a payload is
         self.is_plugged = False
@@ -99,6 +99,9 @@ class U3vCamera:
         bits = int("".join(filter(str.isdigit, pixel_format)))
         mixed = (numpy.arange(pixels, dtype="u8") * 2654435761 + number * 40503) >> 7
         return (mixed & ((1 << bits) - 1)).astype("u2")
+
+    def has_sent_all(self):
+        return not self.stream.packets
 
     def hang(self):
         """It answers nothing more, and stays on the bus."""
@@ -224,6 +227,7 @@ class U3vCamera:
 
     def _wrote(self, name):
         registers = self.registers
+        self.written.append(name)
         if name in ("Width", "Height") and not 0 < registers[name] <= registers[name + "Max"]:
             raise Refused(Status.INVALID_PARAMETER)
         if name == "AcquisitionStart":
