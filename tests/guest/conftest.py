@@ -20,11 +20,13 @@ from usb_port import SUPER_SPEED, BoardCable, UsbPort  # noqa: E402
 
 STAGECTL = ROOT / "build/host/bin/stagectl"
 UF2 = ROOT / "build/firmware/stage.uf2"
+DESCRIBE_CAMERA = ROOT / "build/host/bin/describe_camera"
 INSIDE = HERE / "inside"
 
 
 def pytest_configure():
-    for path, how in ((STAGECTL, "run `make host`"), (emulated_board.IMAGE, "run `make firmware`"), (UF2, "run `make firmware`"),
+    for path, how in ((STAGECTL, "run `make host`"), (DESCRIBE_CAMERA, "run `make host`"),
+                      (emulated_board.IMAGE, "run `make firmware`"), (UF2, "run `make firmware`"),
                       (emulated_board.EMULATOR.parent / "node_modules", "run `make setup`")):
         if not path.exists():
             raise pytest.UsageError(f"{path} is missing: {how}")

@@ -7,11 +7,10 @@ import time
 
 import numpy
 import pytest
-from conftest import ROOT, settle
+from conftest import DESCRIBE_CAMERA, ROOT, settle
 from u3v_camera import CHUNK_FEATURES, U3vCamera, description
 from u3v_registers import Status
 
-DESCRIBE_CAMERA = ROOT / "build/host/bin/describe_camera"
 RULES = ROOT / "host/device/60-open-light-stage.rules"
 RULES_THERE = "/etc/udev/rules.d/60-open-light-stage.rules"
 NOBODY = 65534
