@@ -34,7 +34,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil ## everything that needs no hardware
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil guest-test ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript

@@ -29,6 +29,7 @@ def main():
     if got != (width, height, fourcc.encode()):
         sys.exit(f"the device took {got}")
     os.write(fd, bytes(size))  # a first frame: until then nobody may set the device up to read
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))  # a frame's time is that of its write
     print("ready", flush=True)
     written, late = 1, 0
     if len(numbers) > 3:
