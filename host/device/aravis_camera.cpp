@@ -32,15 +32,38 @@ struct Acquisition {
     bool tells_end = false;   // it says itself whether it is acquiring
 };
 
+// The acquisition that is running, for the camera and its watchdog.
+class Running {
+  public:
+    std::shared_ptr<Acquisition> get() const {
+        const std::lock_guard lock(mutex_);
+        return acquisition_;
+    }
+    void set(std::shared_ptr<Acquisition> acquisition) {
+        const std::lock_guard lock(mutex_);
+        acquisition_.swap(acquisition);
+    }
+
+  private:
+    mutable std::mutex mutex_;
+    std::shared_ptr<Acquisition> acquisition_;
+};
+
 // What the watchdog finds, for whoever asks.
 struct Watch {
+    Running running;
     CameraClock clock;
     std::atomic<uint64_t> life_ns = 0;  // machine time at which the device last gave a sign of life
     std::atomic<bool> is_running = false, tells_end = false, has_ended = false;
 };
 
 void look_after(AravisLink& link, Watch& watch) {
-    if (!watch.is_running || link.is_lost()) return;
+    if (link.is_lost()) {
+        // Once its frames are read: Aravis goes on asking a USB3 camera that has gone, without a pause.
+        if (const auto last = watch.running.get(); last && !last->stream->has_waiting()) watch.running.set(nullptr);
+        return;
+    }
+    if (!watch.is_running) return;
     if (const auto camera_ns = link.time_ns()) watch.clock.asked(*camera_ns, steady_ns());
     if (watch.tells_end && link.is_acquiring() == false) watch.has_ended = true;
     if (link.answers()) watch.life_ns = steady_ns();
@@ -91,12 +114,13 @@ class AravisCamera : public Camera {
             halt();
             return why_gone().value_or(begun.error());
         }
-        const std::lock_guard lock(mutex_);
-        acquisition_ = std::move(begun->first);
-        chosen_ = std::move(begun->second);
-        delivery_.start(acquisition_->started_ns);
+        const uint64_t started_ns = begun->first->started_ns;
+        delivery_.start(started_ns);
         unplaced_ = incomplete_ = 0;
-        return acquisition_->started_ns;
+        watch_->running.set(std::move(begun->first));
+        const std::lock_guard lock(mutex_);
+        chosen_ = std::move(begun->second);
+        return started_ns;
     }
 
     void stop() override {
@@ -119,10 +143,7 @@ class AravisCamera : public Camera {
                 if (frame) return frame;
             }
             if (steady_ns() >= until_ns || running() != acquisition) return std::nullopt;
-            if (!buffer && state().kind != CameraState::live) {
-                if (link_->is_lost()) halt();  // Aravis asks a USB3 camera that has gone without a pause
-                return std::nullopt;
-            }
+            if (!buffer && state().kind != CameraState::live) return std::nullopt;
         }
     }
 
@@ -148,10 +169,7 @@ class AravisCamera : public Camera {
   private:
     void halt() {
         watch_->is_running = false;
-        const std::shared_ptr<Acquisition> ended = [this] {
-            const std::lock_guard lock(mutex_);
-            return std::move(acquisition_);
-        }();
+        watch_->running.set(nullptr);
         // Also of a start that nobody waits for any more.
         library_->post([link = link_, watch = watch_] {
             watch->is_running = false;
@@ -193,10 +211,7 @@ class AravisCamera : public Camera {
         return std::pair{std::move(acquisition), std::move(chosen)};
     }
 
-    std::shared_ptr<Acquisition> running() const {
-        const std::lock_guard lock(mutex_);
-        return acquisition_;
-    }
+    std::shared_ptr<Acquisition> running() const { return watch_->running.get(); }
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
         Frame frame;
@@ -235,7 +250,7 @@ class AravisCamera : public Camera {
 
     // With the lock held.
     std::string link_text() const {
-        const std::string kind = link_->is_gige() ? "GigE Vision" : "USB3 Vision";
+        std::string kind = link_->is_gige() ? "GigE Vision" : "USB3 Vision";
         if (setup_.pixel_format.empty()) return kind;
         return fmt::format("{}, {} at {}, {}{}{}{}", kind, setup_.pixel_format, setup_.offset_x, setup_.offset_y,
                            setup_.has_chunk_time ? ", times by chunk data" : "", chosen_.empty() ? "" : ", ", chosen_);
@@ -249,7 +264,6 @@ class AravisCamera : public Camera {
     mutable std::mutex mutex_;
     AravisSetup setup_;
     std::string chosen_;
-    std::shared_ptr<Acquisition> acquisition_;
     std::atomic<uint64_t> stops_ = 0, dropped_ = 0, underrun_ = 0;
     DeliveryCount delivery_;
     uint64_t unplaced_ = 0, incomplete_ = 0;  // at the last gap; since it

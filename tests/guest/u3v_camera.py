@@ -100,6 +100,11 @@ class U3vCamera:
         mixed = (numpy.arange(pixels, dtype="u8") * 2654435761 + number * 40503) >> 7
         return (mixed & ((1 << bits) - 1)).astype("u2")
 
+    def is_asked(self):
+        """Whether a transfer waits for a frame, and for a good while yet: Aravis drops what comes while one times out."""
+        left_s = self.stream.asked_at + self.registers["MAXIMUM_DEVICE_RESPONSE_TIME"] / 1000 - time.monotonic()
+        return bool(self.stream.transfers) and left_s > 1
+
     def has_sent_all(self):
         return not self.stream.packets
 

@@ -4,6 +4,7 @@ leader", "Image trailer", "Image extended chunk"). Packing by PFNC 2.4."""
 import collections
 import dataclasses
 import struct
+import time
 
 import numpy
 
@@ -21,10 +22,12 @@ class BulkIn:
 
     def __init__(self):
         self.transfers, self.packets = collections.deque(), collections.deque()  # transfers: [tag, capacity, bytes]
+        self.asked_at = 0.0  # when the last one came
         self.is_halted, self.is_silent = False, False
 
     def ask(self, tag, capacity):
         self.transfers.append([tag, capacity, b""])
+        self.asked_at = time.monotonic()
 
     def give(self, data, room):
         """One transfer of the device's, which the host has asked `room` bytes for: shorter ones end with a short packet, be it empty."""
