@@ -61,63 +61,44 @@ class BoardCable:
             pass
 
 
+PATIENCE_S = 180
 FULL_SPEED, SUPER_SPEED = 2, 5  # usb_device_speed of include/uapi/linux/usb/ch9.h
 
 
-class UsbPort:
-    """One port of the guest's USB; `speed` is that of whatever is plugged in."""
+class Attachment:
+    """A device in the port, from the plug to the unplugging: USB/IP's messages to it, and its answers."""
 
-    def __init__(self, guest, inside, number=0, speed=FULL_SPEED):
-        self.guest = guest
-        guest.load("vhci-hcd")
-        channel = f"usb{speed}.{number}"
-        guest.channel(channel, self._serve)
-        self.process = guest.start([sys.executable, inside / "usb_port.py", channel, number, speed])
-        self.lock = threading.Lock()
-        self.device, self.connection = None, None
-        self.pending, self.sizes = {}, {}
-        self.plugged = 0
-        self.empty = threading.Event()
-
-    def plug(self, device):
-        """Plugs the device in; returns when the guest's hub has it."""
+    def __init__(self, device):
         self.device = device
-        self.plugged += 1
-        self.empty = threading.Event()
-        while self.process.input is None:
-            self.process.wait_for("")
-        self.process.input.sendall(b"plug\n")
-        with self.process.changed:
-            self.process.changed.wait_for(lambda: self.process.output.count("plugged") == self.plugged, 180)
-        assert self.process.output.count("plugged") == self.plugged, self.process.errors
+        self.lock = threading.Lock()
+        self.pending, self.sizes = {}, {}
+        self.connection, self.server = None, None
+        self.begun, self.over = threading.Event(), threading.Event()
 
-    def wait_until_empty(self, process):
-        """Until the device has left by itself, as `process` in the guest is to bring it to."""
-        while not self.empty.wait(0.05):
-            assert process.returncode is None, process.output + process.errors
-
-    def unplug(self):
-        if self.device:
-            self.device.close()
-        self._hang_up()
-
-    def _hang_up(self):
-        if self.connection:
-            try:
-                self.connection.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
-
-    def _serve(self, connection):
-        self.connection, self.pending, empty = connection, {}, self.empty
+    def serve(self, connection):
+        self.connection, self.server = connection, threading.current_thread()
         self.device.start(self._answer, self._hang_up)
+        self.begun.set()
         try:
             while True:
                 self._take(read_exactly(connection, HEADER_BYTES))
         except OSError:
             self.device.close()
         connection.close()
-        empty.set()
+        self.over.set()
+
+    def end(self):
+        """Pulls the cable; returns once nothing of it is left, unless the device itself has it pulled."""
+        assert self.begun.wait(PATIENCE_S)
+        self.device.close()
+        self._hang_up()
+        assert threading.current_thread() is self.server or self.over.wait(PATIENCE_S)
+
+    def _hang_up(self):
+        try:
+            self.connection.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
 
     def _take(self, header):
         command, number, _, direction, endpoint = struct.unpack_from(">5I", header)
@@ -164,3 +145,40 @@ class UsbPort:
                 self.connection.sendall(message)
         except OSError:
             pass  # unplugged meanwhile
+
+
+class UsbPort:
+    """One port of the guest's USB; `speed` is that of whatever is plugged in."""
+
+    def __init__(self, guest, inside, number=0, speed=FULL_SPEED):
+        self.guest = guest
+        guest.load("vhci-hcd")
+        channel = f"usb{speed}.{number}"
+        guest.channel(channel, lambda connection: self.attached.serve(connection))
+        self.process = guest.start([sys.executable, inside / "usb_port.py", channel, number, speed])
+        self.attached = None
+        self.plugged = 0
+
+    @property
+    def device(self):
+        return self.attached.device
+
+    def plug(self, device):
+        """Plugs the device in; returns when the guest's hub has it."""
+        self.attached = Attachment(device)
+        self.plugged += 1
+        while self.process.input is None:
+            self.process.wait_for("")
+        self.process.input.sendall(b"plug\n")
+        with self.process.changed:
+            self.process.changed.wait_for(lambda: self.process.output.count("plugged") == self.plugged, PATIENCE_S)
+        assert self.process.output.count("plugged") == self.plugged, self.process.errors
+
+    def wait_until_empty(self, process):
+        """Until the device has left by itself, as `process` in the guest is to bring it to."""
+        while not self.attached.over.wait(0.05):
+            assert process.returncode is None, process.output + process.errors
+
+    def unplug(self):
+        if self.attached:
+            self.attached.end()
