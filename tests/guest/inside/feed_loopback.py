@@ -31,7 +31,7 @@ def main():
     os.write(fd, bytes(size))  # a first frame: until then nobody may set the device up to read
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))  # a frame's time is that of its write
     print("ready", flush=True)
-    written, late = 1, 0
+    written, latest_s = 1, 0.0
     if len(numbers) > 3:
         count, rate_hz = int(numbers[3]), float(numbers[4])
         sys.stdin.readline()
@@ -46,11 +46,10 @@ def main():
             exposed_s = int.from_bytes(record[:8], "little") * 1e-9
             if begin is None:
                 begin = time.monotonic() + HELD_BACK_S - exposed_s
-            wait_s = begin + exposed_s - time.monotonic()
-            late += wait_s < 0
-            time.sleep(max(0.0, wait_s))
+            time.sleep(max(0.0, begin + exposed_s - time.monotonic()))
             written += os.write(fd, record[8:]) == size
-    print(f"written {written}, late {late}", flush=True)
+            latest_s = max(latest_s, time.monotonic() - begin - exposed_s)
+    print(f"written {written}, the latest {latest_s:.3f} s late", flush=True)
     sys.stdin.read()  # the format goes with the last who has the device open
 
 
