@@ -168,6 +168,7 @@ TEST_P(CameraConformance, a_frame_that_never_came_is_counted_when_the_next_one_c
     rig_->lose_one();
     rig_->expose(1);
     const auto frames = read(3);
+    ASSERT_EQ(frames.size(), 3u);
     EXPECT_EQ(frames[2].stamp.frame_id, frames[1].stamp.frame_id + 2);
     EXPECT_EQ(camera_->counts().missing_ids, 1u);
 }
