@@ -32,26 +32,9 @@ struct Acquisition {
     bool tells_end = false;   // it says itself whether it is acquiring
 };
 
-// The acquisition that is running, for the camera and its watchdog.
-class Running {
-  public:
-    std::shared_ptr<Acquisition> get() const {
-        const std::lock_guard lock(mutex_);
-        return acquisition_;
-    }
-    void set(std::shared_ptr<Acquisition> acquisition) {
-        const std::lock_guard lock(mutex_);
-        acquisition_.swap(acquisition);
-    }
-
-  private:
-    mutable std::mutex mutex_;
-    std::shared_ptr<Acquisition> acquisition_;
-};
-
 // What the watchdog finds, for whoever asks.
 struct Watch {
-    Running running;
+    std::atomic<std::shared_ptr<Acquisition>> running;  // of the camera, until it or the watchdog lets go of it
     CameraClock clock;
     std::atomic<uint64_t> life_ns = 0;  // machine time at which the device last gave a sign of life
     std::atomic<bool> is_running = false, tells_end = false, has_ended = false;
@@ -60,7 +43,7 @@ struct Watch {
 void look_after(AravisLink& link, Watch& watch) {
     if (link.is_lost()) {
         // Once its frames are read: Aravis goes on asking a USB3 camera that has gone, without a pause.
-        if (const auto last = watch.running.get(); last && !last->stream->has_waiting()) watch.running.set(nullptr);
+        if (const auto last = watch.running.load(); last && !last->stream->has_waiting()) watch.running.store(nullptr);
         return;
     }
     if (!watch.is_running) return;
@@ -117,7 +100,7 @@ class AravisCamera : public Camera {
         const uint64_t started_ns = begun->first->started_ns;
         delivery_.start(started_ns);
         unplaced_ = incomplete_ = 0;
-        watch_->running.set(std::move(begun->first));
+        watch_->running = std::move(begun->first);
         const std::lock_guard lock(mutex_);
         chosen_ = std::move(begun->second);
         return started_ns;
@@ -169,7 +152,8 @@ class AravisCamera : public Camera {
   private:
     void halt() {
         watch_->is_running = false;
-        watch_->running.set(nullptr);
+        // The device is told to stop before its stream goes.
+        const std::shared_ptr<Acquisition> ended = watch_->running.exchange(nullptr);
         // Also of a start that nobody waits for any more.
         library_->post([link = link_, watch = watch_] {
             watch->is_running = false;
@@ -211,7 +195,7 @@ class AravisCamera : public Camera {
         return std::pair{std::move(acquisition), std::move(chosen)};
     }
 
-    std::shared_ptr<Acquisition> running() const { return watch_->running.get(); }
+    std::shared_ptr<Acquisition> running() const { return watch_->running; }
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
         Frame frame;

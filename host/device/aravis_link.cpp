@@ -196,10 +196,11 @@ Result<std::unique_ptr<AravisStream>> AravisLink::make_stream(std::string& chose
                  "packet-request-ratio", asked_again, nullptr);
     ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
     g_object_get(made, "packet-resend", &resend, nullptr);
+    const std::string buffers = give_buffers(*stream, size_t(*payload), size_t(*payload));
     chosen = fmt::format("packets of {} bytes, {}, {}, socket buffer of {} KiB",
                          arv_gv_device_get_packet_size(ARV_GV_DEVICE(device_.get()), error.out()),
                          resend == ARV_GV_STREAM_PACKET_RESEND_ALWAYS ? "lost ones asked for again" : "lost ones lost",
-                         give_buffers(*stream, size_t(*payload), size_t(*payload)), granted_socket_bytes() / 1024);
+                         buffers, granted_socket_bytes() / 1024);
     return stream;
 }
 

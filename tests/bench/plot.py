@@ -59,7 +59,7 @@ def frame_panel(axes, title, rows, floor):
     ticks = [] if is_all_exact else one_two_five(floor * 3 if is_exact else axes.get_ylim()[0], axes.get_ylim()[1])
     set_scale(axes.yaxis, ([floor] if is_exact else []) + ticks, {floor: "exact"} if is_exact else None)
     axes.set_xlabel("time, ms", fontsize=9)
-    axes.set_ylabel(f"error, {rows[0]['error_unit']}", fontsize=9)
+    axes.set_ylabel(", ".join(filter(None, ("error", rows[0]["error_unit"]))), fontsize=9)
     axes.tick_params(labelsize=8.5, length=2)
     axes.grid(color="#eeeeee")
     axes.set_axisbelow(True)
