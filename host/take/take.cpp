@@ -214,7 +214,7 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
         for (size_t camera = 0; camera < cameras; ++camera)
             recorded.push_back({*devices.cameras[camera], uint32_t(camera), measured_black(take.calibration, camera),
                                 camera_sinks[camera]});
-        return record_take(devices.board, recorded, take.sequence, take.stage, stop);
+        return record_take(devices.board, recorded, take.sequence, take.stage, stop, devices.is_armed);
     });
 }
 
