@@ -12,6 +12,7 @@
 #include "device/camera.hpp"
 #include "record/clock_fit.hpp"
 #include "record/identify.hpp"
+#include "record/record_monitor.hpp"
 #include "record/stop_request.hpp"
 #include "stage/sequence.hpp"
 #include "stage/stage.hpp"
@@ -78,9 +79,10 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
 // trigger is decided for each camera. Each has its reader, its identification and its sink, in threads of its own: what one loses
 // the others do not. `stop` ends the take early, and so do the cameras when none of them is left: the board goes dark, what was
 // fired is still identified, the rest is missing.
+// `monitor`, which may be null, follows; it has seen no other recording.
 // Errors: a camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that
 // fails later is no error here: what was proved stands, the rest is missing and says why.
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const StopRequest& stop);
+                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor = nullptr);
 
 }  // namespace ols
