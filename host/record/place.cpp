@@ -126,10 +126,18 @@ void FramePlacer::begin_stretch(FrameWitness frame, Reason gap) {
 // fired it when the frame was here.
 std::optional<uint64_t> FramePlacer::steps_on_grid(const FrameWitness& frame) const {
     const auto steps = grid_->steps_to(frame.stamp.timestamp_ns);
-    if (!steps) return std::nullopt;
+    if (!steps || (frame.epoch == last_epoch_ && !can_have_passed(*steps, frame.stamp.frame_id))) return std::nullopt;
     const uint64_t counter = lowest_first_counter() + last_position_ + *steps;
     if (counter >= trigger_count_ || (locked_ && counter >= frame.fired_before)) return std::nullopt;
     return steps;
+}
+
+// Whether so many triggers can have passed by the camera's time while it counted up to that id. More ids than triggers there are not; and
+// where triggers that it did not count make whole cycles, it is as well the clock that jumped by these: the optical code is the same.
+bool FramePlacer::can_have_passed(uint64_t steps, uint64_t frame_id) const {
+    const uint64_t id_steps = frame_id - last_stamp_.frame_id;
+    if (id_steps > steps) return id_steps - steps <= strays_.size();
+    return id_steps == steps || (steps - id_steps) % code_.cycle_slots() != 0;
 }
 
 // Adds a frame that lies so far behind the last one to the stretch.

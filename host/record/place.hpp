@@ -85,6 +85,7 @@ class FramePlacer {
 
     void process(FrameWitness frame);
     std::optional<uint64_t> steps_on_grid(const FrameWitness& frame) const;
+    bool can_have_passed(uint64_t steps, uint64_t frame_id) const;
     void append(FrameWitness& frame, uint64_t steps);
     void begin_stretch(FrameWitness frame, Reason gap);
     bool fit_each_other(const std::vector<FrameWitness>& frames) const;

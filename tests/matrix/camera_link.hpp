@@ -2,6 +2,7 @@
 // CameraLink: a camera whose exposures and losses a test makes, and the project's own driver at the other end of its link.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -33,12 +34,12 @@ class CameraLink {
     // The camera's clock is so far.
     virtual void set_now(uint64_t now_ns) = 0;
 
-    // Sends a frame of the size that was set up, or of another. False: there was no room for it. A link that knows waits for room when
-    // `waits`; of one that does not the answer is true.
-    virtual bool send(const Shot& shot, bool waits) = 0;
+    // Sends a frame of the size that was set up, or of another. A link that knows whether there is room waits for it until `in_haste`.
+    // False: there was none; a link that does not know says true.
+    virtual bool send(const Shot& shot, const std::atomic<bool>& in_haste) = 0;
 
     // The camera has counted the frame, and nothing of it arrives, or a part of it.
-    virtual void lose(const Shot& shot, bool in_part) = 0;
+    virtual void lose(const Shot& shot, bool in_part, const std::atomic<bool>& in_haste) = 0;
 
     // How many frames find room with nobody reading.
     virtual int room() const = 0;

@@ -26,6 +26,7 @@ nlohmann::json describe(const Scenario& scenario, const Played& played) {
             {"stalls", stalls},
             {"fired", played.fired},
             {"kept", played.kept},
+            {"without_room", played.without_room},
             {"missing", played.missing},
             {"report", played.report}};
 }

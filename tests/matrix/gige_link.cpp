@@ -54,10 +54,12 @@ class GigeLink : public CameraLink {
     }
 
     Result<std::unique_ptr<Camera>> open() override { return open_camera("aravis:" + address_); }
-    // A frame whose packets come behind a later one's is none for Aravis.
-    bool can(FaultKind kind) const override { return kind != FaultKind::late_within && kind != FaultKind::swap_next; }
+    // A frame whose packets come behind a later one's is none for Aravis; and a camera that restarts has to be opened anew.
+    bool can(FaultKind kind) const override {
+        return kind != FaultKind::late_within && kind != FaultKind::swap_next && kind != FaultKind::restart;
+    }
     void set_now(uint64_t now_ns) override { now_ns_ = now_ns; }
-    bool send(const Shot& shot, bool) override {
+    bool send(const Shot& shot, const std::atomic<bool>&) override {
         sent_height_ = shot.height;
         auto samples = shot.samples;
         samples.resize(size_t(shot.width) * height_);
@@ -65,10 +67,10 @@ class GigeLink : public CameraLink {
         device_.send((shot.stamp.frame_id - 1) % 65535 + 1, shot.stamp.timestamp_ns, samples);
         return true;
     }
-    void lose(const Shot& shot, bool in_part) override {
+    void lose(const Shot& shot, bool in_part, const std::atomic<bool>& in_haste) override {
         if (!in_part) return;
         is_cut_ = true;
-        send(shot, false);
+        send(shot, in_haste);
         is_cut_ = false;
     }
     int room() const override { return driver_buffers; }
@@ -76,6 +78,8 @@ class GigeLink : public CameraLink {
   private:
     // Until the kernel holds no packets of ours for the driver: what is lost to a socket that is full is another test's.
     void wait() const {
+        // And a moment in which the device may answer what the driver asks.
+        std::this_thread::sleep_for(std::chrono::microseconds(50));
         while (device_.is_acquiring() && unread_bytes() > 0) std::this_thread::yield();
     }
     // proc(5), /proc/net/udp: after the two addresses and the state, the queues to send and to be read, in hex.

@@ -21,6 +21,8 @@ constexpr double camera_drift = 23e-6;
 constexpr uint64_t undecided_max = 450;
 // The board's log keeps 1024.
 constexpr uint64_t log_unread_max = 500;
+// From one stall's end to the next: what waits in the camera's buffers has been read, or nobody could tell which stall it was.
+constexpr uint64_t apart = 1200;
 // Frames that the recorder holds (frames_in_flight) before it reads no more, and some.
 constexpr uint64_t held_max = 700;
 
@@ -30,12 +32,20 @@ class Account {
     explicit Account(Played& played) : played_(played) {}
 
     RecordSink sink() {
-        return {
-            [this](const std::shared_ptr<const Frame>& frame) { keep(*frame); },
-            [this](const MissingSlot& slot) { played_.missing.emplace_back(slot.counter, cause_name(slot.why.cause)); },
-            [this](uint64_t decided, uint64_t) { decided_ = decided; }, 0, [this] { return disk_waits_.load(); }};
+        return {[this](const std::shared_ptr<const Frame>& frame) { keep(*frame); },
+                [this](const MissingSlot& slot) {
+                    played_.missing.push_back({slot.counter, cause_name(slot.why.cause), slot.why.text});
+                },
+                [this](uint64_t decided, uint64_t) { decided_ = decided; }, 0,
+                [this] {
+                    // Asked for when the recorder finds no room.
+                    if (is_closed_) is_full_ = true;
+                    return disk_waits_.load();
+                }};
     }
     uint64_t decided() const { return decided_; }
+    // Whether the recorder has found that the gate leaves it no room.
+    const std::atomic<bool>& is_full() const { return is_full_; }
     void close_gate(bool disk) {
         const std::lock_guard lock(mutex_);
         is_closed_ = true;
@@ -43,7 +53,7 @@ class Account {
     }
     void open_gate() {
         const std::lock_guard lock(mutex_);
-        is_closed_ = disk_waits_ = false;
+        is_closed_ = is_full_ = disk_waits_ = false;
         opened_.notify_all();
     }
 
@@ -59,8 +69,7 @@ class Account {
     Played& played_;
     std::mutex mutex_;
     std::condition_variable opened_;
-    bool is_closed_ = false;
-    std::atomic<bool> disk_waits_ = false;
+    std::atomic<bool> is_closed_ = false, is_full_ = false, disk_waits_ = false;
     std::atomic<uint64_t> decided_ = 0;
 };
 
@@ -88,8 +97,8 @@ class Stage {
         start_us_ = board_.now_us();
         const uint64_t end = played_.sequence.trigger_count();
         for (uint64_t n = 0; n < end && !is_over && expose(n); ++n) after(n);
-        for (; !held_.empty(); held_.pop_front()) link_.send(held_.front().shot, true);
         account_.open_gate();
+        for (; !held_.empty(); held_.pop_front()) send(held_.front().trigger, held_.front().shot);
         board_.run_out();
         // The camera's time goes on, so that it is known that nothing more comes.
         for (uint64_t more_ns = 0; !is_over; more_ns += 20'000'000) {
@@ -100,6 +109,7 @@ class Stage {
 
   private:
     struct Held {
+        uint64_t trigger;
         Shot shot;
         int64_t frames_left;
     };
@@ -130,33 +140,41 @@ class Stage {
         Shot shot{{next_id_++, last_ns_}, uint32_t(camera_.width), uint32_t(camera_.height), {}};
         shot.samples = light_.expose(n, !is(FaultKind::no_light));
         if (is(FaultKind::stale_buffer) && !last_samples_.empty()) shot.samples = last_samples_;
-        last_samples_ = shot.samples;
         if (is(FaultKind::bad_time)) shot.stamp.timestamp_ns += 150'000;
         if (is(FaultKind::wrong_size)) {
             shot.height -= 2;
             shot.samples.resize(size_t(shot.width) * shot.height);
         }
         if (is(FaultKind::lose_frame) || is(FaultKind::cut_frame))
-            link_.lose(shot, strike.kind == FaultKind::cut_frame);
+            link_.lose(shot, strike.kind == FaultKind::cut_frame, account_.is_full());
         else if (is(FaultKind::late_within) || is(FaultKind::late_beyond))
-            held_.push_back({std::move(shot), strike.amount});
+            held_.push_back({n, std::move(shot), strike.amount});
         else if (is(FaultKind::swap_next))
-            held_.push_back({std::move(shot), 1});
+            held_.push_back({n, std::move(shot), 1});
         else
-            deliver(shot, is(FaultKind::twice) ? 2 : 1);
+            deliver(n, shot, is(FaultKind::twice) ? 2 : 1);
         return true;
     }
 
-    void deliver(const Shot& shot, int times) {
-        for (int n = 0; n < times; ++n) found_no_room_ += !link_.send(shot, !stall_);
+    void send(uint64_t trigger, const Shot& shot) {
+        if (link_.send(shot, account_.is_full())) {
+            if (shot.height == uint32_t(camera_.height)) last_samples_ = shot.samples;
+            return;
+        }
+        ++found_no_room_;
+        played_.without_room.push_back(trigger);
+    }
+
+    void deliver(uint64_t trigger, const Shot& shot, int times) {
+        for (int n = 0; n < times; ++n) send(trigger, shot);
         for (size_t i = 0; i < held_.size();) {
             if (--held_[i].frames_left > 0) {
                 ++i;
                 continue;
             }
-            const Shot late = std::move(held_[i].shot);
+            const Held late = std::move(held_[i]);
             held_.erase(held_.begin() + ptrdiff_t(i));
-            found_no_room_ += !link_.send(late, !stall_);
+            send(late.trigger, late.shot);
         }
     }
 
@@ -166,10 +184,11 @@ class Stage {
             played_.stalled.emplace_back(stall_from_, n);
             played_.stalls_of_disk.push_back(stall_->disk);
             stall_.reset();
+            stall_ended_at_ = n;
             account_.open_gate();
         }
         const auto begins = played_.injection.stalls.find(n);
-        if (stall_ || begins == played_.injection.stalls.end()) return;
+        if (stall_ || begins == played_.injection.stalls.end() || n < stall_ended_at_ + apart) return;
         stall_ = begins->second;
         stall_from_ = n;
         // A link that does not tell loses what is beyond all that is held.
@@ -201,7 +220,7 @@ class Stage {
     uint64_t start_us_ = 0, last_ns_ = 0, next_id_ = 1;
     int64_t jumped_ns_ = 0;
     std::optional<Stall> stall_;
-    uint64_t stall_from_ = 0, stall_until_ = 0, given_up_at_ = UINT64_MAX;
+    uint64_t stall_ended_at_ = 0, stall_from_ = 0, stall_until_ = 0, given_up_at_ = UINT64_MAX;
     int found_no_room_ = 0;
 };
 

@@ -13,11 +13,12 @@ namespace ols::test {
 struct Played {
     Sequence sequence;
     Injection injection;
-    std::string lit;                                        // of the slots of a cycle: 1 where the camera sees light
-    uint64_t fired = 0;                                     // triggers, in fact
-    std::vector<std::pair<uint64_t, uint64_t>> stalled;     // [first, last] triggers during which nothing was let go of
-    std::vector<bool> stalls_of_disk;                       // of each of them
-    std::vector<std::pair<uint64_t, std::string>> missing;  // trigger and cause, by the account
+    std::string lit;                                     // of the slots of a cycle: 1 where the camera sees light
+    uint64_t fired = 0;                                  // triggers, in fact
+    std::vector<std::pair<uint64_t, uint64_t>> stalled;  // [first, last] triggers during which nothing was let go of
+    std::vector<uint64_t> without_room;                  // triggers whose frames found none, of links that know
+    std::vector<bool> stalls_of_disk;                    // of each of them
+    std::vector<nlohmann::json> missing;                 // trigger, cause and why, by the account
     std::vector<std::pair<uint64_t, uint64_t>> kept;  // trigger by the account, and the one whose light is in the frame
     nlohmann::json report;                            // what the recorder says beside
 };

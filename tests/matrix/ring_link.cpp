@@ -28,23 +28,25 @@ class RingLink : public CameraLink {
         now_ns_ = now_ns;
         writer_->set_watermark(now_ns);
     }
-    bool send(const Shot& shot, bool waits) override {
+    bool send(const Shot& shot, const std::atomic<bool>& in_haste) override {
         Frame frame;
         frame.stamp = shot.stamp;
         frame.width = shot.width, frame.height = shot.height;
         frame.pitch_bytes = shot.width * uint32_t(sizeof(uint16_t));
         frame.samples.resize(size_t(frame.pitch_bytes) * frame.height);
         std::memcpy(frame.samples.data(), shot.samples.data(), frame.samples.size());
-        return writer_->write(frame, waits, never_) != RingWriter::Outcome::full;
+        auto outcome = RingWriter::Outcome::cancelled;
+        if (!in_haste) outcome = writer_->write(frame, true, in_haste);
+        if (outcome == RingWriter::Outcome::cancelled) outcome = writer_->write(frame, false, in_haste);
+        return outcome != RingWriter::Outcome::full;
     }
-    void lose(const Shot&, bool) override {}
+    void lose(const Shot&, bool, const std::atomic<bool>&) override {}
     int room() const override { return int(ring_slots); }
 
   private:
     const std::string path_;
     std::optional<RingWriter> writer_;
     uint64_t now_ns_ = 0;
-    std::atomic<bool> never_ = false;
 };
 
 }  // namespace

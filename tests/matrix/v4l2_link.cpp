@@ -38,13 +38,13 @@ class V4l2Link : public CameraLink {
         }
     }
     void set_now(uint64_t now_ns) override { now_ns_ = now_ns; }
-    bool send(const Shot& shot, bool waits) override {
-        if (waits) wait();
+    bool send(const Shot& shot, const std::atomic<bool>& in_haste) override {
+        wait(in_haste);
         return expose(shot, 0, 0);
     }
     // In part: marked as damaged by its driver, or too short, in turn.
-    void lose(const Shot& shot, bool in_part) override {
-        wait();
+    void lose(const Shot& shot, bool in_part, const std::atomic<bool>& in_haste) override {
+        wait(in_haste);
         if (!in_part) return;
         const bool is_marked = ++cut_ % 2 == 0;
         expose(shot, is_marked ? V4L2_BUF_FLAG_ERROR : 0, is_marked ? 0 : 32);
@@ -53,8 +53,8 @@ class V4l2Link : public CameraLink {
 
   private:
     // A reader that is not late leaves the driver more than the buffers that it works with (device/v4l2_stamps.cpp).
-    void wait() {
-        while (model_->is_streaming() && model_->free_buffers() < buffers / 2) std::this_thread::yield();
+    void wait(const std::atomic<bool>& in_haste) {
+        while (!in_haste && model_->is_streaming() && model_->free_buffers() < buffers / 2) std::this_thread::yield();
     }
     bool expose(const Shot& shot, uint32_t flags, size_t bytes_short) {
         const bool has_room = model_->free_buffers() > 0;
