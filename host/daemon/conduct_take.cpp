@@ -185,6 +185,7 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
     nlohmann::json account = take_json(*report, archives);
     account.update(watched);
     account["take"] = take->name;
+    account["slots_missing_total"] = report->record.missing().total();
     {
         const std::lock_guard lock(mutex_);
         now_.last_take = account;
