@@ -42,7 +42,7 @@ TakeRequest take_request(JsonObject& params) {
     if (!request.quality.empty() && std::ranges::find(names, request.quality) == names.end())
         params.reject("quality", "is none of none, preview, standard and final");
     if (!request.slate.empty())
-        if (const Status fits = check_slate(request.slate); !fits) params.reject("slate", ": " + fits.error().message);
+        if (const Status fits = check_slate(request.slate); !fits) params.reject("slate", "is none: " + fits.error().message);
     return request;
 }
 
@@ -164,7 +164,7 @@ RpcOutcome Api::call(const std::string& name, const json& given, const std::stri
         return {nullptr,
                 RpcError{RpcError::wrong_state, fmt::format("{} is for the states {}, and the stage is in state {}",
                                                             name, state_words(method->allowed), state_name(state))}};
-    JsonObject params(given, name);
+    JsonObject params(given, "the call of " + name, "is wrong");
     return call_now(name, params, caller);
 }
 

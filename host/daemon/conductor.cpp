@@ -66,6 +66,7 @@ void Conductor::work() {
         job = {};
         const std::lock_guard lock(mutex_);
         job_ = {};
+        stop_.reset();  // or it would cut short what is asked of the board from now on
         changed_.notify_all();
     }
     if (devices_) (void)devices_->make_dark();

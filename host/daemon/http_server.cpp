@@ -3,12 +3,12 @@
 #include "daemon/http_server.hpp"
 
 #include <fmt/format.h>
-#include <httplib.h>
 
 #include <atomic>
 #include <filesystem>
 #include <thread>
 
+#include "daemon/bounded_server.hpp"
 #include "daemon/call_rate.hpp"
 #include "daemon/subscriber.hpp"
 #include "daemon/token.hpp"
@@ -18,7 +18,6 @@ namespace ols {
 
 namespace {
 
-constexpr int patience_s = 5;  // for the next piece of a request, or room for the next of a response
 constexpr std::chrono::seconds comment_pause(15);
 
 // "127.0.0.1:8156" or "localhost:8156".
@@ -44,6 +43,7 @@ struct HttpServer::State {
         const std::string shown = request.get_header_value("Authorization");
         const std::string scheme = "Bearer ";
         if (shown.compare(0, scheme.size(), scheme) != 0 || !is_token(shown.substr(scheme.size()), token)) return 401;
+        if (request.has_header("Transfer-Encoding")) return 411;
         if (request.has_header("Content-Length") &&
             request.get_header_value<uint64_t>("Content-Length") > request_bytes_max)
             return 413;
@@ -53,10 +53,10 @@ struct HttpServer::State {
     void refuse(int status, httplib::Response& response) {
         const char* const why = status == 421   ? "this is for http://127.0.0.1 and http://localhost alone"
                                 : status == 403 ? "pages of another origin may not ask"
+                                : status == 411 ? "say how long the request is: Content-Length"
                                 : status == 413 ? "a request has at most 65536 bytes"
                                                 : "show the token: Authorization: Bearer TOKEN";
         response.status = status;
-        response.set_header("Connection", "close");  // a body may follow that nobody reads
         if (status == 401) response.set_header("WWW-Authenticate", "Bearer");
         response.set_content(std::string(why) + "\n", "text/plain");
         if (const auto now = std::chrono::steady_clock::now(); now >= next_told) {
@@ -71,7 +71,7 @@ struct HttpServer::State {
     const std::string token;
     Api& api;
     EventLog& events;
-    httplib::Server server;
+    BoundedHttpServer server{HttpBounds{}};
     std::atomic<bool> ends = false;
     std::atomic<int> streams = 0;
     std::mutex mutex;  // of what follows
@@ -160,9 +160,6 @@ Result<std::unique_ptr<HttpServer>> HttpServer::listen(const DaemonSetup& setup,
     auto state = std::make_unique<State>(std::move(*token), api, events);
     state->server.new_task_queue = [] { return new httplib::ThreadPool(size_t(threads)); };
     state->server.set_payload_max_length(request_bytes_max);
-    state->server.set_read_timeout(patience_s);
-    state->server.set_write_timeout(patience_s);
-    state->server.set_keep_alive_timeout(patience_s);
     state->server.set_socket_options([](int socket) {
         const int on = 1;  // not SO_REUSEPORT, with which a second daemon would share the port
         setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
