@@ -2,12 +2,14 @@
 // The main thread: signals, systemd's watchdog, and the look at what runs.
 #include "daemon/daemon.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/signalfd.h>
+#include <poll.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
 #include <poll.h>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 
@@ -24,28 +26,34 @@ constexpr int look_ms = 100;
 constexpr std::chrono::seconds stuck_after(120);
 constexpr uint64_t ending_extension_us = 30'000'000;  // systemd waits for as long from each call on
 
-// SIGTERM, SIGINT and SIGHUP as they come, blocked in every thread.
+int signal_pipe[2] = {-1, -1};
+
+void pass_on(int signal_number) {
+    const int error = errno;
+    const char byte = char(signal_number);
+    (void)!::write(signal_pipe[1], &byte, 1);
+    errno = error;
+}
+
+// SIGTERM, SIGINT and SIGHUP as they come. By handlers and a pipe: libraries have threads of their own before main(), in which no mask of
+// ours would hold a signal back.
 class Signals {
   public:
     Signals() {
-        sigset_t set;
-        sigemptyset(&set);
-        for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
-        pthread_sigmask(SIG_BLOCK, &set, nullptr);
-        fd_ = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+        if (::pipe2(signal_pipe, O_CLOEXEC | O_NONBLOCK) != 0) return;
+        struct sigaction action {};
+        action.sa_handler = pass_on;
+        action.sa_flags = SA_RESTART;
+        for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaction(number, &action, nullptr);
     }
-    ~Signals() { ::close(fd_); }
 
     // 0: none within `timeout_ms`.
     int wait(int timeout_ms) {
-        pollfd ready{fd_, POLLIN, 0};
+        pollfd ready{signal_pipe[0], POLLIN, 0};
         (void)::poll(&ready, 1, timeout_ms);
-        signalfd_siginfo info;
-        return ::read(fd_, &info, sizeof info) == ssize_t(sizeof info) ? int(info.ssi_signo) : 0;
+        char byte;
+        return ::read(signal_pipe[0], &byte, 1) == 1 ? int(byte) : 0;
     }
-
-  private:
-    int fd_;
 };
 
 void notify_state(const Snapshot& now) {
@@ -122,7 +130,7 @@ Status check_configuration(const std::string& path) {
 }
 
 Status run_daemon(const DaemonOptions& options) {
-    Signals signals;  // before any thread
+    Signals signals;
     auto stage = read_stage(options.config_path);
     if (!stage) return stage.error();
     if (const Status fits = check_words(stage->daemon, *stage); !fits) return fits;
