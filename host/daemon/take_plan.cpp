@@ -43,8 +43,8 @@ TakeChoices choices_of(const TakeRequest& request, const DaemonSetup& setup) {
 
 Result<SequenceConfig> find_sequence(const std::string& name, const DaemonSetup& setup) {
     if (const Status fits = check_slate(name); !fits)
-        return fail(fmt::format("'{}' names no sequence: give the name of a file in '{}', without .toml, or a basis", name,
-                                setup.sequences));
+        return fail(fmt::format("'{}' names no sequence: give the name of a file in '{}', without .toml, or a basis",
+                                name, setup.sequences));
     const fs::path file = fs::path(setup.sequences) / (name + ".toml");
     std::error_code error;
     if (fs::exists(file, error)) return read_sequence(file.string());
@@ -83,8 +83,8 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
     plan.choices = choices_of(request, setup);
     const double seconds = request.seconds.value_or(setup.seconds);
     // Targets of a performance need half a cycle before and after them.
-    const double cycles = std::ceil(seconds * double(tick_hz) / double(one_cycle->cycle_ticks()) - 1e-9) +
-                          (plan.choices.fps > 0 ? 1 : 0);
+    const double cycles =
+        std::ceil(seconds * double(tick_hz) / double(one_cycle->cycle_ticks()) - 1e-9) + (plan.choices.fps > 0 ? 1 : 0);
     if (!(cycles >= 1 && cycles <= cycles_max))
         return fail(fmt::format("a take lasts from one cycle to {:.0f} s, and not {} s",
                                 cycles_max * double(one_cycle->cycle_ticks()) / double(tick_hz), seconds));
@@ -94,7 +94,8 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
     plan.sequence = std::move(*sequence);
     auto calibration = open_calibration(plan.choices, stage);
     if (!calibration)
-        return fail(calibration.error().message + "; with the daemon: `stagectl calibrate`, or [daemon] nominal = true");
+        return fail(calibration.error().message +
+                    "; with the daemon: `stagectl calibrate`, or [daemon] nominal = true");
     plan.calibration = std::move(*calibration);
     auto targets = targets_of(plan.choices, plan.sequence);
     if (!targets) return targets.error();

@@ -83,8 +83,8 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
 // Sets the cameras up as the stage says and starts them, loads the sequence, arms and starts the board, and returns when every
 // trigger is decided for each camera. Each has its reader, its identification and its sink, in threads of its own: what one loses
 // the others do not. `stop` ends the take early, and so do the cameras when none of them is left: the board goes dark, what was
-// fired is still identified, the rest is missing. A board `is_armed` by arm_board() with this sequence is only started.
-// `monitor`, which may be null, follows; it has seen no other recording.
+// fired is still identified, the rest is missing. A board `is_armed` by arm_board() with this sequence is only
+// started. `monitor`, which may be null, follows; it has seen no other recording.
 // Errors: a camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that
 // fails later is no error here: what was proved stands, the rest is missing and says why.
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
