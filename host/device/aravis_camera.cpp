@@ -101,7 +101,6 @@ class AravisCamera : public Camera {
         }
         const uint64_t started_ns = begun->first->started_ns;
         delivery_.start(started_ns);
-        incomplete_ = 0;
         watch_->running = std::move(begun->first);
         const std::lock_guard lock(mutex_);
         chosen_ = std::move(begun->second);
@@ -207,7 +206,6 @@ class AravisCamera : public Camera {
         if (kind == AravisFrames::Kind::whole && acquisition.stream->is_disowned(buffer))
             kind = AravisFrames::Kind::incomplete;
         underrun_ += kind == AravisFrames::Kind::incomplete;
-        incomplete_ += kind == AravisFrames::Kind::incomplete;
         if (kind != AravisFrames::Kind::whole) return std::nullopt;
         const uint64_t missing = delivery_.counts().missing_ids;
         if (!delivery_.take(frame.stamp)) return std::nullopt;
@@ -217,11 +215,10 @@ class AravisCamera : public Camera {
         return frame;
     }
 
-    // Ids that were passed over while packets found no buffer, but for those whose buffers came incomplete.
+    // Ids that were passed over while packets found no buffer.
     void count_dropped(BufferStarvation& starvation, int64_t gap) {
-        if (gap <= 0) return;
-        if (starvation.explains_gap()) dropped_ += uint64_t(std::max<int64_t>(gap - int64_t(incomplete_), 0));
-        incomplete_ = 0;
+        const bool is_starved = starvation.explains_gap();
+        if (is_starved && gap > 0) dropped_ += uint64_t(gap);
     }
 
     std::optional<Error> why_gone() const {
@@ -254,7 +251,6 @@ class AravisCamera : public Camera {
     std::string chosen_;
     std::atomic<uint64_t> stops_ = 0, dropped_ = 0, underrun_ = 0;
     DeliveryCount delivery_;
-    uint64_t incomplete_ = 0;  // since the last gap
 };
 
 }  // namespace

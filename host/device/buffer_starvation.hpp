@@ -17,7 +17,7 @@ class BufferStarvation {
     void start(size_t buffers, uint64_t unplaced) {
         buffers_ = buffers;
         unplaced_ = unplaced;
-        taken_ = 0;
+        taken_ = last_whole_ = 0;
         gaps_after_.clear();
     }
 
@@ -28,17 +28,19 @@ class BufferStarvation {
         ++taken_;
     }
 
-    // Whether frames that are missing before the buffer taken last had found none.
+    // What was taken last is a whole frame. Whether those that are missing before it, since the last whole one, had found none, be it for
+    // some of their packets only.
     bool explains_gap() {
-        const uint64_t before = taken_ - 1;
-        while (!gaps_after_.empty() && gaps_after_.front() < before) gaps_after_.pop_front();
-        return !gaps_after_.empty() && gaps_after_.front() <= before + being_read;
+        while (!gaps_after_.empty() && gaps_after_.front() < last_whole_) gaps_after_.pop_front();
+        last_whole_ = taken_;
+        return !gaps_after_.empty() && gaps_after_.front() < taken_ + being_read;
     }
 
   private:
     static constexpr uint64_t being_read = 1;  // or none
 
     uint64_t buffers_ = 0, unplaced_ = 0, taken_ = 0;
+    uint64_t last_whole_ = 0;          // of those taken
     std::deque<uint64_t> gaps_after_;  // so many buffers
 };
 

@@ -26,6 +26,7 @@ DONE = {
 RIGHT = {done: cause for done, (_, cause) in DONE.items()}
 NOTHING_CAME = ("miss_trigger", "lose_frame", "cut_frame", "late_beyond", "host", "disk")
 KEPT = "kept"
+AFTER_STALL = 64  # triggers by which whoever reads has come to it again
 
 
 class Verdicts:
@@ -103,7 +104,7 @@ class Verdicts:
         """Where no witness can tell, what may be said instead."""
         if done in NOTHING_CAME and said == "no_frame" and not self.first_came < trigger < self.last_came:
             return "no frame before it, or none after it, has a count to tell by"
-        if done in NOTHING_CAME and trigger in self.stalled and said == RIGHT[self.stalled[trigger]] and self.link != "ring":
+        if done in NOTHING_CAME and self.link != "ring" and said in (RIGHT[of] for of in self._stalls_beside(trigger)):
             return "lost while nothing had room, of which this driver is told no more"
         if trigger in self.mixed:
             return "of a gap the numbers are told, and not which is which"
@@ -116,6 +117,10 @@ class Verdicts:
         if said in ("not_proved", "no_frame", "restarted") and trigger < self.first_kept:
             return "before the first frame that has its place"
         return None
+
+    def _stalls_beside(self, trigger):
+        """Stalls that it falls into, or behind which nobody has read on yet."""
+        return [of for first, last, of in self.stalls if first <= trigger <= last + AFTER_STALL]
 
     def _collateral(self, trigger, said):
         """Frames that came as they should and are missing: the account may doubt them, and blame nobody."""
