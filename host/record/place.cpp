@@ -133,11 +133,11 @@ std::optional<uint64_t> FramePlacer::steps_on_grid(const FrameWitness& frame) co
 }
 
 // Whether so many triggers can have passed by the camera's time while it counted up to that id. More ids than triggers there are not; and
-// where triggers that it did not count make whole cycles, it is as well the clock that jumped by these: the optical code is the same.
+// where triggers that it did not count make whole groups, it is as well the clock that jumped by these: the next landmarks look the same.
 bool FramePlacer::can_have_passed(uint64_t steps, uint64_t frame_id) const {
     const uint64_t id_steps = frame_id - last_stamp_.frame_id;
     if (id_steps > steps) return id_steps - steps <= strays_.size();
-    return id_steps == steps || (steps - id_steps) % code_.cycle_slots() != 0;
+    return id_steps == steps || (steps - id_steps) % group_slots_ != 0;
 }
 
 // Adds a frame that lies so far behind the last one to the stretch.
