@@ -129,7 +129,7 @@ class Stage {
         if (!rise_ticks) return false;
         ++played_.fired;
         const auto found = played_.injection.strikes.find(n);
-        const bool is_struck = found != played_.injection.strikes.end() && link_.can(found->second.kind);
+        const bool is_struck = found != played_.injection.strikes.end();
         const Strike strike = is_struck ? found->second : Strike{};
         const auto is = [&](FaultKind kind) { return is_struck && strike.kind == kind; };
         if (is(FaultKind::clock_jump)) jumped_ns_ += strike.amount;
@@ -263,6 +263,9 @@ Result<Played> play_take(const Scenario& scenario, const std::string& link_name,
     auto board = Board::connect(host_board.connect());
     if (!board.ok()) return board.error();
     const auto link = make_link(link_name, scenario, work);
+    for (const FaultSpec& fault : scenario.faults)
+        if (!link->can(fault.kind))
+            return fail(std::string("no camera at a link like ") + link_name + " does " + fault_kind_name(fault.kind));
     Account account(played);
     Stage world(scenario, host_board, *link, account, camera, played);
     std::atomic<bool> is_over = false;
