@@ -42,7 +42,8 @@ TakeRequest take_request(JsonObject& params) {
     if (!request.quality.empty() && std::ranges::find(names, request.quality) == names.end())
         params.reject("quality", "is none of none, preview, standard and final");
     if (!request.slate.empty())
-        if (const Status fits = check_slate(request.slate); !fits) params.reject("slate", "is none: " + fits.error().message);
+        if (const Status fits = check_slate(request.slate); !fits)
+            params.reject("slate", "is none: " + fits.error().message);
     return request;
 }
 
