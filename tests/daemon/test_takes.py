@@ -78,7 +78,7 @@ def test_ctrl_c_at_the_client_ends_the_light_and_finishes_the_take(daemon):
 
 def test_arming_foretells_and_stop_takes_it_back(daemon):
     plan = daemon.run("arm", "--seconds", "0.5", "--json")
-    assert daemon.state() == "armed" and plan["cycles"] == 6 and plan["seconds"] == pytest.approx(0.5)
+    assert daemon.state() == "armed" and plan["cycles"] == 6 and plan["seconds"] == pytest.approx(0.5, rel=1e-4)
     daemon.run("stop")
     assert daemon.state() == "idle"
 
