@@ -38,6 +38,7 @@ struct CheckUp {
     std::string board_link;  // "" none is known
     std::vector<CameraPlace> cameras;
     std::string takes_folder, spill_folder;  // "" not given
+    double disk_s = 3;                       // for which a disk is written to, and read again
     bool is_quick = false;                   // nothing that takes more than a second or two is measured
 
     std::function<Result<Board>()> open_board;

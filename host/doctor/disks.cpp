@@ -84,6 +84,7 @@ Findings check_speed(const CheckUp& up, const Use& use, double shared_bytes_per_
     if (!room.ok()) return skip_speed("there is no such folder", use.folder);
     if (room->is_memory) return skip_speed("in memory (tmpfs), not on a disk", use.folder);
     DiskSpeedOptions options;
+    options.seconds_max = up.disk_s;
     options.progress = [&up](uint64_t done, uint64_t total) { up.progress("measuring a disk", done, total); };
     const auto speed = measure_disk(use.folder, options);
     if (!speed.ok()) {

@@ -96,6 +96,7 @@ Findings check_groups(const CheckUp& up) {
 
 struct Node {
     std::string path, what;
+    std::string look;  // a command that shows which there are
 };
 
 // The node of a device of sysfs: /dev/bus/usb/001/004.
@@ -123,9 +124,10 @@ std::vector<Node> usb_nodes(const CheckUp& up) {
         const bool is_board = vendor == fmt::format("{:04x}", board_usb_vendor) &&
                               product == fmt::format("{:04x}", board_usb_product) &&
                               machine.read(folder + "/product") == board_usb_name;
-        if (is_board && up.board_link.starts_with("usb:")) nodes.push_back({usb_node(machine, folder), "the board"});
+        if (is_board && up.board_link.starts_with("usb:"))
+            nodes.push_back({usb_node(machine, folder), "the board", "lsusb"});
         if (std::ranges::any_of(up.cameras, &CameraPlace::may_be_usb3) && is_usb3_camera(machine, name, all))
-            nodes.push_back({usb_node(machine, folder), "a USB3 Vision camera"});
+            nodes.push_back({usb_node(machine, folder), "a USB3 Vision camera", "lsusb"});
     }
     return nodes;
 }
@@ -134,12 +136,13 @@ std::vector<Node> nodes_named(const CheckUp& up) {
     std::vector<Node> nodes = usb_nodes(up);
     for (const CameraPlace& camera : up.cameras)
         if (camera.kind == CameraPlace::v4l2)
-            nodes.push_back({camera.name.starts_with('/') ? camera.name : "/dev/video" + camera.name, camera.title()});
+            nodes.push_back({camera.name.starts_with('/') ? camera.name : "/dev/video" + camera.name, camera.title(),
+                             "v4l2-ctl --list-devices"});
     if (!up.stage.gpio.has_lines()) return nodes;
     const std::string& chip = up.stage.gpio.chip;
     const bool is_number = !chip.empty() && std::ranges::all_of(chip, [](char c) { return c >= '0' && c <= '9'; });
     const std::string path = chip.starts_with('/') ? chip : (is_number ? "/dev/gpiochip" : "/dev/") + chip;
-    if (up.machine.exists(path)) nodes.push_back({path, "[gpio]"});  // a label is looked up by gpio.lines
+    if (up.machine.exists(path)) nodes.push_back({path, "[gpio]", "gpiodetect"});  // a label is looked up by gpio.lines
     return nodes;
 }
 
@@ -153,8 +156,7 @@ Finding check_node(const Machine& machine, const Node& node) {
     if (!machine.exists(node.path)) {
         finding.verdict = Verdict::fail;
         finding.found = "there is no such node";
-        finding.commands = {node.path.starts_with("/dev/video") ? "v4l2-ctl --list-devices    # which there are"
-                                                                : "ls -l " + node.path};
+        finding.commands = {node.look + "    # which there are"};
     } else if (!machine.may_open(node.path)) {
         finding.verdict = Verdict::fail;
         finding.found = fmt::format("{} may not open it", machine.user());

@@ -10,6 +10,10 @@ namespace ols {
 
 namespace {
 
+std::string cores_text(int cores) {
+    return fmt::format("{} core{}", cores, cores == 1 ? "" : "s");
+}
+
 Finding check_governor(const Machine& machine) {
     std::map<std::string, int> cores_of;
     for (const std::string& name : machine.list("/sys/devices/system/cpu"))
@@ -21,7 +25,7 @@ Finding check_governor(const Machine& machine) {
                        "rules the processor's clock");
     std::string found;
     for (const auto& [governor, cores] : cores_of)
-        found += fmt::format("{}{} on {} cores", found.empty() ? "" : ", ", governor, cores);
+        found += fmt::format("{}{} on {}", found.empty() ? "" : ", ", governor, cores_text(cores));
     Finding finding{
         Check::governor,
         "",
@@ -62,7 +66,7 @@ Finding check_cores(const CheckUp& up) {
         Check::cores,
         "",
         Verdict::ok,
-        fmt::format("{} cores", cores),
+        cores_text(cores),
         fmt::format("{}: a reader for each camera and one for developing; more make developing faster", needed),
         {}};
     if (cores >= needed) return finding;

@@ -33,7 +33,7 @@ int list_checks(bool as_json) {
         else
             fmt::print("{:<26}{}\n", name.id, name.what);
     }
-    if (as_json) print_json(json);
+    if (as_json) print_json({{"checks", json}});
     return 0;
 }
 
