@@ -28,14 +28,13 @@ std::set<std::string> interfaces_of(const CheckUp& up) {
 }
 
 std::string up_command(const std::string& name) {
-    return fmt::format("sudo ip link set {} down; sudo ip link set {} up type can bitrate {} restart-ms 100", name,
-                       name, bit_rate_hz);
+    return fmt::format("sudo ip link set {} down; sudo ip link set {} up type can bitrate {}", name, name, bit_rate_hz);
 }
 
 // As systemd-networkd brings it up at each start (systemd.network(5), "[CAN]").
 std::string lasting_command(const std::string& name) {
     return write_file_command(fmt::format("/etc/systemd/network/80-{}.network", name),
-                              {"[Match]", "Name=" + name, "[CAN]", "BitRate=1M", "RestartSec=100ms"}) +
+                              {"[Match]", "Name=" + name, "[CAN]", "BitRate=1M"}) +
            " && sudo systemctl enable --now systemd-networkd";
 }
 
