@@ -23,6 +23,7 @@ namespace {
 
 constexpr size_t piece_bytes = size_t(4) << 20;  // of one call
 constexpr size_t alignment = 4096;               // that O_DIRECT asks for at most, of address, place and size
+constexpr double sync_s_max = 0.5;               // for which one sync may go on, so that the whole is bounded
 constexpr uint64_t least_bytes = 8 * piece_bytes;
 
 struct Descriptor {
@@ -69,7 +70,7 @@ int nameless_file(const std::string& folder) {
 Status write_pieces(int fd, std::byte* piece, uint64_t bytes, const DiskSpeedOptions& options,
                     const std::string& folder, DiskSpeed& speed) {
     const uint64_t begin_ns = steady_ns(), end_ns = begin_ns + uint64_t(options.seconds_max * 1e9);
-    uint64_t unsynced = 0;
+    uint64_t synced = 0, unsynced = 0;
     while (speed.bytes < bytes && (steady_ns() < end_ns || speed.bytes == 0)) {
         std::memcpy(piece, &speed.bytes, sizeof speed.bytes);
         for (size_t done = 0; done < piece_bytes;) {
@@ -80,11 +81,15 @@ Status write_pieces(int fd, std::byte* piece, uint64_t bytes, const DiskSpeedOpt
         }
         speed.bytes += piece_bytes;
         unsynced += piece_bytes;
-        if (unsynced >= options.synced_bytes) {
+        const double so_far_s = double(steady_ns() - begin_ns) * 1e-9;
+        const auto soon_bytes = uint64_t(double(synced) / so_far_s * sync_s_max);
+        if (unsynced >= std::min(options.synced_bytes, soon_bytes)) {
             if (::fdatasync(fd) != 0) return cannot("cannot sync a file", folder);
+            synced = speed.bytes;
             unsynced = 0;
         }
-        options.progress((steady_ns() - begin_ns) / 1'000'000, uint64_t(options.seconds_max * 2e3));
+        options.progress((steady_ns() - begin_ns) / 1'000'000,
+                         uint64_t(options.seconds_max * (options.is_read ? 2e3 : 1e3)));
     }
     if (::fdatasync(fd) != 0) return cannot("cannot sync a file", folder);
     speed.write_s = double(steady_ns() - begin_ns) * 1e-9;
@@ -132,7 +137,8 @@ Result<DiskSpeed> measure_disk(const std::string& folder, const DiskSpeedOptions
     DiskSpeed speed;
     if (const Status wrote = write_pieces(file.fd, piece.get(), bytes, options, folder, speed); !wrote.ok())
         return wrote.error();
-    if (!room->is_memory) speed.read_bytes_per_s = read_pieces(file.fd, piece.get(), options, speed.bytes);
+    if (options.is_read && !room->is_memory)
+        speed.read_bytes_per_s = read_pieces(file.fd, piece.get(), options, speed.bytes);
     options.progress(1, 1);
     return speed;
 }

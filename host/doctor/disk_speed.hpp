@@ -12,9 +12,11 @@
 namespace ols {
 
 struct DiskSpeedOptions {
-    double seconds_max = 3;                      // for writing, and again for reading
-    uint64_t bytes_max = uint64_t(1) << 30;      // and no more than a tenth of what is free
-    uint64_t synced_bytes = uint64_t(32) << 20;  // written between two syncs, as targets of an archive are
+    double seconds_max = 3;                  // for writing, and again for reading
+    uint64_t bytes_max = uint64_t(1) << 30;  // and no more than a tenth of what is free
+    // Written between two syncs, as an archive syncs each target; less on a disk that is slow.
+    uint64_t synced_bytes = uint64_t(96) << 20;
+    bool is_read = true;  // back, too
     // How much of the time is over.
     std::function<void(uint64_t done_ms, uint64_t total_ms)> progress = [](uint64_t, uint64_t) {};
 };

@@ -2,6 +2,9 @@
 // The disks of takes and of spilled frames: room, and speed against what the stage asks for.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "doctor/check_up.hpp"
 #include "doctor/disk_speed.hpp"
 
@@ -58,13 +61,15 @@ Finding check_room(const CheckUp& up, const Use& use) {
     return finding;
 }
 
-Finding judge_speed(const Use& use, Check check, double bytes_per_s, double needed, const std::string& how) {
+// `take_s`: how long the take is that was to be written, or read, in as long.
+Finding judge_speed(const Use& use, Check check, double bytes_per_s, double needed, double take_s,
+                    const std::string& how) {
     Finding finding = finding_of(use, check);
     finding.found = fmt::format("{}/s {}", bytes_text(bytes_per_s), how);
     finding.needed = fmt::format("{}/s of {}", bytes_text(needed), use.what);
     if (bytes_per_s >= needed) return finding;
     finding.verdict = Verdict::warn;
-    finding.found += fmt::format(", {:.2g} of what is needed", bytes_per_s / needed);
+    finding.found += fmt::format(": a take of {:g} s takes {:.0f} s", take_s, std::ceil(take_s * needed / bytes_per_s));
     finding.needed += fmt::format("; slower, {}", use.when_slow);
     finding.commands = {
         fmt::format("findmnt -T '{}' && lsblk -d -o NAME,ROTA,TRAN,MODEL    # a faster one? else a lower "
@@ -85,6 +90,10 @@ Findings check_speed(const CheckUp& up, const Use& use, double shared_bytes_per_
     if (room->is_memory) return skip_speed("in memory (tmpfs), not on a disk", use.folder);
     DiskSpeedOptions options;
     options.seconds_max = up.disk_s;
+    options.is_read = use.is_read;
+    if (!use.is_read)
+        for (const CameraNeeds& camera : up.needs.cameras)
+            if (camera.target_bytes > 0) options.synced_bytes = std::min(options.synced_bytes, camera.target_bytes);
     options.progress = [&up](uint64_t done, uint64_t total) { up.progress("measuring a disk", done, total); };
     const auto speed = measure_disk(use.folder, options);
     if (!speed.ok()) {
@@ -98,8 +107,8 @@ Findings check_speed(const CheckUp& up, const Use& use, double shared_bytes_per_
     }
     const std::string how =
         fmt::format("over {} in {:.1f} s, synced", bytes_text(double(speed->bytes)), speed->write_s);
-    Findings findings = {
-        judge_speed(use, Check::disk_write, speed->write_bytes_per_s, use.write_bytes_per_s + shared_bytes_per_s, how)};
+    Findings findings = {judge_speed(use, Check::disk_write, speed->write_bytes_per_s,
+                                     use.write_bytes_per_s + shared_bytes_per_s, up.needs.take_s, how)};
     if (!use.is_read)
         findings.push_back(skipped(Check::disk_read, "archives are not read while takes are recorded", use.folder));
     else if (!speed->read_bytes_per_s)
@@ -107,7 +116,7 @@ Findings check_speed(const CheckUp& up, const Use& use, double shared_bytes_per_
             skipped(Check::disk_read, "this file system gives no way past the system's memory (O_DIRECT)", use.folder));
     else
         findings.push_back(judge_speed(use, Check::disk_read, *speed->read_bytes_per_s, use.write_bytes_per_s,
-                                       "past the system's memory"));
+                                       up.needs.take_s, "past the system's memory"));
     return findings;
 }
 

@@ -126,6 +126,10 @@ TEST_F(DisksOfAStage, are_judged_by_what_the_stage_asks_for) {
     EXPECT_EQ(verdict_of(Check::disk_write), Verdict::ok);
     up.needs.cameras[0].frames_per_s = 1e7;  // 20 TB/s
     EXPECT_EQ(verdict_of(Check::disk_write), Verdict::warn);
+    for (const Finding& finding : check_disks(up))
+        if (finding.check == Check::disk_write) {
+            EXPECT_NE(finding.found.find(": a take of 10 s takes "), std::string::npos) << finding.found;
+        }
     EXPECT_EQ(files_here(), 0u);
 }
 
@@ -149,6 +153,15 @@ TEST_F(DisksOfAStage, are_measured_within_bounds_and_nothing_stays) {
     EXPECT_GT(calls, 1u);
     EXPECT_EQ(last, 1u);
     EXPECT_EQ(files_here(), 0u);
+}
+
+TEST_F(DisksOfAStage, are_read_only_where_it_matters) {
+    DiskSpeedOptions options;
+    options.seconds_max = 0.1;
+    options.is_read = false;
+    const auto speed = measure_disk(disk_, options);
+    ASSERT_TRUE(speed.ok()) << speed.error().message;
+    EXPECT_FALSE(speed->read_bytes_per_s);
 }
 
 // Whatever happens in the middle of it: killed, or at a limit of sizes.
