@@ -19,17 +19,17 @@ Finding check_firmware(const CheckUp& up, Board& board) {
     Finding finding{
         Check::board_firmware,
         up.board_link,
-        Verdict::ok,
+        CheckVerdict::ok,
         fmt::format("{} ({}), chain of {} bits", version, board.info().board, uint16_t(board.info().chain_bits)),
         fmt::format("{}, this release's, and a chain of the stage's {} bits", shipped_firmware, up.stage.chain_bits),
         {}};
     if (up.stage.chain_bits != int(uint16_t(board.info().chain_bits))) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.commands = {
             "ls build/firmware    # an image for this board's chain? make flash BOARD=NAME; or [chain] bits in "
             "stage.toml"};
     } else if (version != shipped_firmware) {
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.commands = {"make flash    # in the source folder"};
     }
     return finding;
@@ -38,26 +38,26 @@ Finding check_firmware(const CheckUp& up, Board& board) {
 Finding check_fault(const CheckUp& up, Board& board) {
     Finding finding{Check::board_fault,
                     up.board_link,
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     "",
                     "idle, no fault latched: it plays nothing until a fault is "
                     "cleared, and one that plays belongs to another take",
                     {}};
     const auto status = board.status();
     if (!status.ok()) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = status.error().message;
         finding.commands = {"stagectl status --board " + up.board_link};
         return finding;
     }
     finding.found = fmt::format("{}, fault: {}", state_name(status->state), fault_text(*status));
     if (status->state == OLS_STATE_FAULT) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.commands = {
             fmt::format("stagectl status --board {} --clear-fault    # once its cause is gone", up.board_link)};
     } else if (status->state == OLS_STATE_PLAYING || status->state == OLS_STATE_WAITING ||
                status->state == OLS_STATE_ARMED) {
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.commands = {"ps -C stagectl    # whose take is it? end that, or wait"};
     }
     return finding;
@@ -72,11 +72,11 @@ Findings check_board(const CheckUp& up) {
         for (Finding& finding : skip_rest("no board is named")) findings.push_back(std::move(finding));
         return findings;
     }
-    Finding link{Check::board_link, up.board_link, Verdict::ok, "", "a board that answers", {}};
+    Finding link{Check::board_link, up.board_link, CheckVerdict::ok, "", "a board that answers", {}};
     auto board = up.open_board();
     Findings findings;
     if (!board.ok()) {
-        link.verdict = Verdict::fail;
+        link.verdict = CheckVerdict::fail;
         link.found = board.error().message;
         link.commands = {
             fmt::format("stagectl status --board {} --wait 30    # and plug it in, or off and on", up.board_link)};

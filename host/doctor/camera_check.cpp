@@ -27,11 +27,15 @@ Findings check_camera(const CheckUp& up, const CameraPlace& place) {
         return {skipped(Check::camera_link, why, place.title()),
                 skipped(Check::camera_setup, "no source", place.title())};
     }
-    Finding link{
-        Check::camera_link, place.title(), Verdict::ok, "", "a camera that is there and that no other program has", {}};
+    Finding link{Check::camera_link,
+                 place.title(),
+                 CheckVerdict::ok,
+                 "",
+                 "a camera that is there and that no other program has",
+                 {}};
     auto camera = open_camera(place.source, uint32_t(place.number));
     if (!camera.ok()) {
-        link.verdict = Verdict::fail;
+        link.verdict = CheckVerdict::fail;
         link.found = camera.error().message;
         link.commands = {look_command(place)};
         return {link, skipped(Check::camera_setup, "the camera could not be opened", place.title())};
@@ -39,7 +43,7 @@ Findings check_camera(const CheckUp& up, const CameraPlace& place) {
     Finding setup{
         Check::camera_setup,
         place.title(),
-        Verdict::ok,
+        CheckVerdict::ok,
         "",
         fmt::format("{}, and whatever else the stage's [[camera]] asks for", size_text(up.stage.cameras[place.number])),
         {}};
@@ -48,7 +52,7 @@ Findings check_camera(const CheckUp& up, const CameraPlace& place) {
     link.found = fmt::format("{} ({})", info.name, place.source);
     setup.found = fmt::format("{}; {}", size_text(info.setup), info.link);
     if (!accepted.ok()) {
-        setup.verdict = Verdict::fail;
+        setup.verdict = CheckVerdict::fail;
         setup.found = accepted.error().message;
         setup.commands = {"${EDITOR:-nano} stage.toml    # the keys that are named; docs/cameras.md"};
     }

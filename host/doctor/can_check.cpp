@@ -44,7 +44,7 @@ bool is_can(const Machine& machine, const std::string& name) {
 
 Finding check_interface(const Machine& machine, const std::string& name, const std::optional<LinkDetails>& details) {
     const std::string folder = "/sys/class/net/" + name;
-    Finding finding{Check::can_interface, name, Verdict::fail, "", "a CAN interface that is up", {}};
+    Finding finding{Check::can_interface, name, CheckVerdict::fail, "", "a CAN interface that is up", {}};
     if (!machine.exists(folder)) {
         finding.found = "there is no such interface";
         finding.commands = {"ip link show type can    # which there are; none: is the adapter in, its module loaded?"};
@@ -68,7 +68,7 @@ Finding check_interface(const Machine& machine, const std::string& name, const s
             up_command(name)};
         return finding;
     }
-    finding.verdict = Verdict::ok;
+    finding.verdict = CheckVerdict::ok;
     finding.found = "up";
     return finding;
 }
@@ -79,13 +79,13 @@ Finding check_bit_rate(const std::string& name, const std::optional<LinkDetails>
         return skipped(Check::can_bit_rate, fmt::format("an interface of kind '{}' has none", details->kind), name);
     Finding finding{Check::can_bit_rate,
                     name,
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     fmt::format("{} bit/s", details->can_bit_rate_hz),
                     fmt::format("{} bit/s, as the boards have it, or {} with a firmware built for that", bit_rate_hz,
                                 other_bit_rate_hz),
                     {}};
     if (details->can_bit_rate_hz == bit_rate_hz) return finding;
-    finding.verdict = details->can_bit_rate_hz == other_bit_rate_hz ? Verdict::warn : Verdict::fail;
+    finding.verdict = details->can_bit_rate_hz == other_bit_rate_hz ? CheckVerdict::warn : CheckVerdict::fail;
     finding.commands = {up_command(name), lasting_command(name)};
     return finding;
 }
@@ -95,13 +95,13 @@ Finding check_queue(const Machine& machine, const std::string& name) {
     if (!length) return skipped(Check::can_queue, "the kernel does not say", name);
     Finding finding{Check::can_queue,
                     name,
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     fmt::format("{} frames", *length),
                     fmt::format("{}: the frames of one message; with fewer, sending waits and tries again in between",
                                 frames_a_message),
                     {}};
     if (*length >= frames_a_message) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.commands = {
         fmt::format("sudo ip link set {} txqueuelen 1000", name),
         fmt::format(
@@ -115,7 +115,7 @@ Finding check_queue(const Machine& machine, const std::string& name) {
 Finding check_isotp(const Machine& machine) {
     Finding finding{Check::can_isotp,
                     "",
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     "",
                     "the kernel's ISO-TP answers a board also while stagectl does not run; "
                     "without it stagectl uses its own, which a busy machine delays",
@@ -132,7 +132,7 @@ Finding check_isotp(const Machine& machine) {
     else if (names("modules.dep"))
         finding.found = "a module that is loaded when it is asked for";
     if (!finding.found.empty()) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.found = fmt::format("no module can_isotp for the kernel {}", release);
     finding.commands = {"sudo apt install linux-image-amd64 && sudo reboot    # Debian's kernel has it, from 5.10 on"};
     return finding;

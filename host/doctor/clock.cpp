@@ -16,14 +16,14 @@ Finding check_source(const Machine& machine) {
     Finding finding{
         Check::clock_source,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         *source,
         "one that is read in the processor (tsc, kvm-clock, arch_sys_counter): hpet and acpi_pm cost a system "
         "call and a microsecond and more each time, and a frame is stamped several times",
         {}};
     if (*source == "tsc" || *source == "kvm-clock" || *source == "arch_sys_counter" || source->starts_with("hyperv"))
         return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.commands = {
         "sudo dmesg | grep -i -e clocksource -e tsc    # why it was not taken",
         fmt::format("cat {}/available_clocksource    # has tsc? boot with clocksource=tsc:", source_folder),
@@ -38,7 +38,7 @@ Finding check_wall(const Machine& machine) {
     Finding finding{
         Check::clock_synchronised,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         "",
         "a clock that a server sets: takes, logs and certificates are dated by it. Nothing of a take's own times "
         "depends on it",
@@ -47,7 +47,7 @@ Finding check_wall(const Machine& machine) {
         finding.found = fmt::format("synchronised, off by {:.3g} s at most", clock->error_bound_s);
         return finding;
     }
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.found = "the kernel's clock is set by nobody";
     finding.commands = {"sudo apt install chrony && sudo systemctl enable --now chrony",
                         "chronyc waitsync 30    # and when it is right"};

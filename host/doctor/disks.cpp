@@ -31,7 +31,7 @@ std::vector<Use> uses_of(const CheckUp& up) {
 }
 
 Finding finding_of(const Use& use, Check check) {
-    return {check, use.folder, Verdict::ok, "", "", {}};
+    return {check, use.folder, CheckVerdict::ok, "", "", {}};
 }
 
 Finding check_room(const CheckUp& up, const Use& use) {
@@ -43,17 +43,17 @@ Finding check_room(const CheckUp& up, const Use& use) {
                                  up.needs.take_s, bytes_text(use.write_bytes_per_s));
     const auto room = room_of(use.folder);
     if (!room.ok()) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = room.error().message;
         finding.commands = {fmt::format("sudo install -d -o {} '{}'", up.machine.user(), use.folder)};
         return finding;
     }
     finding.found = bytes_text(double(room->free_bytes)) + " free";
     if (double(room->free_bytes) < needed) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.commands = {fmt::format("du -sh '{}'/* | sort -h | tail    # the largest there", use.folder)};
     } else if (room->is_memory) {
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.found += ", in memory (tmpfs), not on a disk";
         finding.needed += "; what is in memory is gone when the machine goes, and is no longer free for frames";
         finding.commands = {"df -hT    # which folders are on disks"};
@@ -68,7 +68,7 @@ Finding judge_speed(const Use& use, Check check, double bytes_per_s, double need
     finding.found = fmt::format("{}/s {}", bytes_text(bytes_per_s), how);
     finding.needed = fmt::format("{}/s of {}", bytes_text(needed), use.what);
     if (bytes_per_s >= needed) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.found += fmt::format(": a take of {:g} s takes {:.0f} s", take_s, std::ceil(take_s * needed / bytes_per_s));
     finding.needed += fmt::format("; slower, {}", use.when_slow);
     finding.commands = {
@@ -98,7 +98,7 @@ Findings check_speed(const CheckUp& up, const Use& use, double shared_bytes_per_
     const auto speed = measure_disk(use.folder, options);
     if (!speed.ok()) {
         Finding finding = finding_of(use, Check::disk_write);
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = speed.error().message;
         finding.needed = fmt::format("{} are written there", use.what);
         finding.commands = {fmt::format("ls -ld '{0}'; df '{0}'    # sudo chown {1} '{0}', or make room", use.folder,

@@ -10,16 +10,16 @@
 namespace ols {
 
 Finding skipped(Check check, std::string why, std::string subject) {
-    return {check, std::move(subject), Verdict::skipped, std::move(why), "", {}};
+    return {check, std::move(subject), CheckVerdict::skipped, std::move(why), "", {}};
 }
 
-size_t count_of(const Findings& findings, Verdict verdict) {
+size_t count_of(const Findings& findings, CheckVerdict verdict) {
     return size_t(std::ranges::count(findings, verdict, &Finding::verdict));
 }
 
 int exit_code_of(const Findings& findings) {
-    if (count_of(findings, Verdict::fail) > 0) return 1;
-    return count_of(findings, Verdict::warn) > 0 ? 2 : 0;
+    if (count_of(findings, CheckVerdict::fail) > 0) return 1;
+    return count_of(findings, CheckVerdict::warn) > 0 ? 2 : 0;
 }
 
 std::string bytes_text(double bytes) {

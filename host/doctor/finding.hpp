@@ -80,13 +80,13 @@ inline constexpr std::array<CheckName, size_t(Check::count)> check_names = {{
     {"can.isotp", "the kernel has ISO-TP"},
 }};
 
-enum class Verdict { ok, warn, fail, skipped };
+enum class CheckVerdict { ok, warn, fail, skipped };
 inline constexpr std::array<std::string_view, 4> verdict_names = {"ok", "warn", "fail", "skipped"};
 
 struct Finding {
     Check check = Check::count;
     std::string subject;  // which camera, folder, interface; empty where there is one thing to look at
-    Verdict verdict = Verdict::skipped;
+    CheckVerdict verdict = CheckVerdict::skipped;
     std::string found;                  // with figure and unit; of a skipped check, why it was
     std::string needed;                 // what is needed, and why; empty for a skipped check
     std::vector<std::string> commands;  // what to type where it is not ok, a line each
@@ -101,7 +101,7 @@ Finding skipped(Check check, std::string why, std::string subject = "");
 
 // 0: all is well; 2: warnings; 1: something that keeps a shoot from going well.
 int exit_code_of(const Findings& findings);
-size_t count_of(const Findings& findings, Verdict verdict);
+size_t count_of(const Findings& findings, CheckVerdict verdict);
 
 // "53.1 MB", "416 kB", "1.33 GB": decimal, as disks and links are sold.
 std::string bytes_text(double bytes);

@@ -12,20 +12,20 @@ namespace {
 Finding check_line(const std::string& chip, const std::string& use, const GpioLineSetup& setup) {
     Finding finding{Check::gpio_lines,
                     use,
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     "",
                     fmt::format("line '{}' of '{}', used by nobody else", setup.line, chip),
                     {}};
     const auto look = look_at_line(chip, setup.line);
     if (!look.ok()) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = look.error().message;
         finding.commands = {"gpioinfo    # chips and lines; package gpiod"};
         return finding;
     }
     finding.found = fmt::format("offset {} of {}", look->offset, look->chip);
     if (!look->is_used) return finding;
-    finding.verdict = Verdict::fail;
+    finding.verdict = CheckVerdict::fail;
     finding.found += fmt::format(", used by '{}'", look->consumer.empty() ? "the kernel" : look->consumer);
     finding.commands = {"gpioinfo    # who has it: end that program, unload that driver, or choose another line"};
     return finding;

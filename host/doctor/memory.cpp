@@ -25,16 +25,16 @@ Finding check_free(const CheckUp& up) {
     const double take = raw * up.needs.take_s;
     Finding finding{Check::memory_free,
                     "",
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     bytes_text(double(*free)) + " free",
                     fmt::format("{}: {:g} cycles of frames; {} for a take of {:g} s that is held in memory, at {}/s",
                                 bytes_text(least), cycles_held, bytes_text(take), up.needs.take_s, bytes_text(raw)),
                     {}};
     if (double(*free) < least) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.commands = {"ps --sort=-rss -eo rss,pid,comm | head    # who has it: end it, or fit more"};
     } else if (double(*free) < take) {
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.found += fmt::format(", {:.1f} s of frames", double(*free) / raw);
         finding.commands = {
             "ps --sort=-rss -eo rss,pid,comm | head    # who has it",
@@ -54,7 +54,7 @@ Finding check_lock(const CheckUp& up) {
     Finding finding{
         Check::memory_lock,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         limit->soft == Limit::none ? "no limit" : bytes_text(double(limit->soft)) + " at most",
         fmt::format("{}: {:g} cycles of frames that the kernel must not swap out", bytes_text(needed), cycles_held),
         {}};
@@ -67,7 +67,7 @@ Finding check_lock(const CheckUp& up) {
         finding.found += ", and there is no swap that frames could go to";
         return finding;
     }
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.commands = {write_file_command("/etc/security/limits.d/stage-memory.conf",
                                            {fmt::format("{} - memlock unlimited", up.machine.user())}) +
                         "    # then log out and in again"};
@@ -81,12 +81,12 @@ Finding check_swap(const CheckUp& up) {
     Finding finding{
         Check::memory_swap,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         *total == 0 ? "no swap" : fmt::format("{} of {} in use", bytes_text(double(used)), bytes_text(double(*total))),
         "none in use: what is swapped out comes back from a disk, at the moment at which a frame needs it",
         {}};
     if (used == 0) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.commands = {
         write_file_command("/etc/sysctl.d/60-stage-swap.conf", {"vm.swappiness = 1"}) + " && sudo sysctl --system",
         "sudo swapoff -a && sudo swapon -a    # brings back what is out; needs as much free memory"};

@@ -14,7 +14,7 @@ struct CameraNeeds {
     uint64_t frame_bytes = 0;  // in memory and spilled: a 16-bit word a sample
     // On its link, at most: whole bytes a sample, as a camera without packed formats sends it.
     uint64_t link_frame_bytes = 0;
-    uint64_t target_bytes = 0;  // in an archive, with lamps, mask, variance
+    uint64_t target_bytes = 0;  // of an archive, at most
 
     double raw_bytes_per_s() const { return frames_per_s * double(frame_bytes); }
     double link_bytes_per_s() const { return frames_per_s * double(link_frame_bytes); }
@@ -30,7 +30,9 @@ struct StageNeeds {
     double archive_bytes_per_s() const;  // of all cameras, while it is recorded
 };
 
-// `target_rate_hz` 0: a target a cycle, as `stagectl run` without --fps makes them.
-StageNeeds needs_of(const StageConfig& stage, const Sequence& sequence, double take_s, double target_rate_hz);
+// `target_rate_hz` 0: a target a cycle, as `stagectl run` without --fps makes them. `target_bytes`: of each camera's targets, in their
+// order; none of a sequence that is no capture.
+StageNeeds needs_of(const StageConfig& stage, const Sequence& sequence, double take_s, double target_rate_hz,
+                    const std::vector<uint64_t>& target_bytes);
 
 }  // namespace ols

@@ -49,7 +49,7 @@ Finding check_socket(const CheckUp& up, Check check, const char* name, const cha
     Finding finding{
         check,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         fmt::format("{} bytes", *value),
         fmt::format(
             "{:.0f} bytes: what camera {} sends in {:.0f} ms at {}/s, while Aravis asks for lost packets again or "
@@ -58,7 +58,7 @@ Finding check_socket(const CheckUp& up, Check check, const char* name, const cha
             aravis_socket_bytes >> 20, why),
         {}};
     if (double(*value) >= need.bytes()) return finding;
-    finding.verdict = Verdict::fail;
+    finding.verdict = CheckVerdict::fail;
     finding.commands = {write_file_command("/etc/sysctl.d/60-stage-sockets.conf",
                                            {fmt::format("net.core.rmem_max = {}", aravis_socket_bytes),
                                             fmt::format("net.core.rmem_default = {}", aravis_socket_bytes)}) +
@@ -90,7 +90,7 @@ Finding check_mtu(const CheckUp& up, const CameraPlace& camera) {
     Finding finding{
         Check::mtu,
         camera.title(),
-        Verdict::ok,
+        CheckVerdict::ok,
         fmt::format("{} bytes on {}", *mtu, interface),
         fmt::format(
             "{} bytes: jumbo frames, {:.0f} packets a second instead of {:.0f} at an MTU of 1500 (each costs the "
@@ -98,7 +98,7 @@ Finding check_mtu(const CheckUp& up, const CameraPlace& camera) {
             jumbo_mtu, packets(jumbo_mtu), packets(1500)),
         {}};
     if (*mtu >= jumbo_mtu) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     // The link file of an interface is the only one that counts for it: the lines of Debian's 99-default.link are in it.
     const std::string address = up.machine.read("/sys/class/net/" + interface + "/address").value_or("");
     finding.commands = {
@@ -142,7 +142,7 @@ Finding check_filter(const CheckUp& up, const CameraPlace& camera) {
     Finding finding{
         Check::rp_filter,
         camera.title(),
-        Verdict::ok,
+        CheckVerdict::ok,
         "",
         "not strict (1) where the way to the camera's address is not the interface that it is at: its answers "
         "would be dropped, and it would never be found",
@@ -152,7 +152,7 @@ Finding check_filter(const CheckUp& up, const CameraPlace& camera) {
         if (ports.empty())
             return skipped(Check::rp_filter, no_route(camera, route) + "; no port that is up has a strict filter",
                            camera.title());
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.found = fmt::format("{}; strict on {}", no_route(camera, route), ports);
         finding.commands = loose_commands(ports.substr(0, ports.find(',')));
         return finding;
@@ -161,7 +161,7 @@ Finding check_filter(const CheckUp& up, const CameraPlace& camera) {
     finding.found = fmt::format("{} on {}, and {} is {}", filter, route->interface, camera.address,
                                 route->is_direct ? "in its network" : "behind a router");
     if (filter == strict && !route->is_direct) {
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.commands = loose_commands(route->interface);
     }
     return finding;
@@ -176,13 +176,13 @@ Finding check_packet_socket(const CheckUp& up) {
     Finding finding{
         Check::packet_socket,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         "this process has CAP_NET_RAW",
         "CAP_NET_RAW: Aravis then takes frames from the kernel's ring without a call and a copy for each packet; "
         "without it frames come by UDP, which costs more and loses packets sooner",
         {}};
     if (up.machine.has_capability(13 /* CAP_NET_RAW */)) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.found = "this process has no CAP_NET_RAW";
     finding.commands = {
         "sudo setcap cap_net_raw+ep $(readlink -f $(command -v stagectl))    # again after each installation",

@@ -35,7 +35,7 @@ Finding check_rules(const CheckUp& up) {
     Finding finding{
         Check::udev_rules,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         "",
         "the rules that this release brings: without them only root may open boards and USB3 cameras",
         {fmt::format("sudo install -m 644 host/device/{} /etc/udev/rules.d/    # in the source folder", rules_name),
@@ -46,11 +46,11 @@ Finding check_rules(const CheckUp& up) {
         if (!text) continue;
         finding.found = path;
         if (rules_in(*text) == rules_in(shipped_rules)) return finding;
-        finding.verdict = Verdict::warn;
+        finding.verdict = CheckVerdict::warn;
         finding.found += " has other rules than this release";
         return finding;
     }
-    finding.verdict = Verdict::fail;
+    finding.verdict = CheckVerdict::fail;
     finding.found = fmt::format("no {} in any folder of udev's", rules_name);
     return finding;
 }
@@ -65,12 +65,12 @@ std::vector<std::pair<std::string, std::string>> groups_needed(const CheckUp& up
 }
 
 Finding check_group(const Machine& machine, const std::string& group, const std::string& what) {
-    Finding finding{Check::groups, group, Verdict::ok, "", fmt::format("owns {}", what), {}};
+    Finding finding{Check::groups, group, CheckVerdict::ok, "", fmt::format("owns {}", what), {}};
     if (machine.groups().contains(group)) {
         finding.found = fmt::format("{} is in it", machine.user());
         return finding;
     }
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.needed +=
         "; who sits at the machine may do without where udev gives devices to seats (uaccess), a service "
         "or a login from afar may not";
@@ -149,16 +149,16 @@ std::vector<Node> nodes_named(const CheckUp& up) {
 Finding check_node(const Machine& machine, const Node& node) {
     Finding finding{Check::nodes,
                     node.path,
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     "may be read and written",
                     fmt::format("{} is opened to read and write", node.what),
                     {}};
     if (!machine.exists(node.path)) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = "there is no such node";
         finding.commands = {node.look + "    # which there are"};
     } else if (!machine.may_open(node.path)) {
-        finding.verdict = Verdict::fail;
+        finding.verdict = CheckVerdict::fail;
         finding.found = fmt::format("{} may not open it", machine.user());
         finding.commands = {fmt::format("ls -l {}    # the group that owns it", node.path),
                             fmt::format("sudo usermod -aG $(stat -c %G {}) {}    # then log out and in again",

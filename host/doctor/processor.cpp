@@ -29,13 +29,13 @@ Finding check_governor(const Machine& machine) {
     Finding finding{
         Check::governor,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         found,
         "performance: at 2160 frames/s a core rests some 0.4 ms between frames, and one that was clocked down "
         "meanwhile is late for the next",
         {}};
     if (cores_of.size() == 1 && cores_of.contains("performance")) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     const std::string file = "/etc/tmpfiles.d/stage-governor.conf";
     finding.commands = {
         write_file_command(file, {"w- /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor - - - - performance"}),
@@ -65,12 +65,12 @@ Finding check_cores(const CheckUp& up) {
     Finding finding{
         Check::cores,
         "",
-        Verdict::ok,
+        CheckVerdict::ok,
         cores_text(cores),
         fmt::format("{}: a reader for each camera and one for developing; more make developing faster", needed),
         {}};
     if (cores >= needed) return finding;
-    finding.verdict = Verdict::warn;
+    finding.verdict = CheckVerdict::warn;
     finding.commands = {"lscpu    # fewer than the machine has? see CPUAffinity= and `taskset -p $$`"};
     return finding;
 }
@@ -84,12 +84,12 @@ Finding check_files(const CheckUp& up) {
     const uint64_t needed = files_apart + files_a_camera * up.cameras.size();
     Finding finding{Check::open_files,
                     "",
-                    Verdict::ok,
+                    CheckVerdict::ok,
                     limit->soft == Limit::none ? "no limit" : fmt::format("{} files", limit->soft),
                     fmt::format("{}: {} for each camera and {} for the rest", needed, files_a_camera, files_apart),
                     {}};
     if (limit->soft >= needed) return finding;
-    finding.verdict = Verdict::fail;
+    finding.verdict = CheckVerdict::fail;
     finding.commands = {write_file_command("/etc/security/limits.d/stage.conf",
                                            {fmt::format("{} - nofile {}", up.machine.user(), 4 * needed)}) +
                         "    # then log out and in again"};

@@ -11,6 +11,7 @@
 #include "device/board.hpp"
 #include "record/cause.hpp"
 #include "record/clock_fit.hpp"
+#include "record/record_monitor.hpp"
 #include "stage/sequence.hpp"
 
 namespace ols {
@@ -42,10 +43,11 @@ class BoardLog {
     // on_end comes once, last.
     // When `why_stop` says something the board is told to stop, and what it fired until then is still read; LogEnd says it.
     // `between` may use the board, before each look at its log; its error means that the board is heard no more.
+    // `monitor`, which may be null, hears of triggers, of the stop and of the dark.
     // A board that is heard no more, or whose log or clock does not go on as it must, is told to stop and given up.
     BoardLog(Board& board, const PlayBounds& bounds, std::function<std::vector<uint64_t>()> arrivals,
              std::function<Reason()> why_stop, std::function<void(LogNews)> on_news, std::function<void(LogEnd)> on_end,
-             std::function<Status()> between = {});
+             std::function<Status()> between = {}, RecordMonitor* monitor = nullptr);
     ~BoardLog();  // waits for the end
 
     // This machine's steady clock beside the board's, by what was asked of the board. After the end.
@@ -55,6 +57,8 @@ class BoardLog {
     LogEnd follow();
     LogEnd read_to_end();
     Status check_clock(const ols_status_reply& status);
+    Result<ols_status_reply> ask_status();
+    void tell_to_stop();
 
     Board& board_;
     const PlayBounds bounds_;
@@ -63,6 +67,9 @@ class BoardLog {
     std::function<void(LogNews)> on_news_;
     HostClock host_clock_;
     std::function<Status()> between_;
+    RecordMonitor own_monitor_;  // where nobody else's is given
+    RecordMonitor& monitor_;
+    StageBeat& beat_;
     uint64_t last_tick_ = 0;  // that the board told
     std::optional<Deadline> next_tick_;
     std::thread thread_;

@@ -2,6 +2,8 @@
 // Frames in, and what is known of each.
 #include "record/camera_reader.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "exceptions.hpp"
@@ -21,16 +23,20 @@ bool is_whole(const Frame& frame, const CameraConfig& config) {
 
 }  // namespace
 
-CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue)
+CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue,
+                           RecordMonitor& monitor, size_t place)
     : camera_(camera),
       config_(config),
       options_(std::move(options)),
       bits_(config),
-      room_(std::make_shared<Room>(ptrdiff_t(options_.frames_max))),
       queue_(queue),
+      monitor_(monitor),
+      place_(place),
+      beat_(monitor.stages().add(fmt::format("camera {} reader", place))),
       dropped_before_(camera.counts().dropped) {
     thread_ = std::thread([this] {
         const Status done = guarded("the camera cannot be read", [this] { return read(), Status(Done{}); });
+        beat_.beat(StageActivity::ended);
         if (!done) queue_.push(CameraPause{0, {CameraState::gone, done.error().message}, disk_drops_, host_drops_});
     });
 }
@@ -43,7 +49,9 @@ CameraReader::~CameraReader() {
 void CameraReader::read() {
     while (!end_) {
         count_drops();
-        if (!room_->try_acquire_for(std::chrono::milliseconds(pause_ms))) continue;
+        beat_.beat(StageActivity::waits_for_room);
+        if (!options_.room->take_place(std::chrono::milliseconds(pause_ms))) continue;
+        beat_.beat();
         CameraState state = camera_.state();
         const bool is_live = state.kind == CameraState::live;
         const uint64_t watermark_ns = camera_.watermark_ns();
@@ -53,7 +61,7 @@ void CameraReader::read() {
             enqueue(std::move(*frame));
             continue;
         }
-        room_->release();
+        options_.room->give_back_place();
         queue_.push(CameraPause{watermark_ns, std::move(state), disk_drops_, host_drops_});
         if (!is_live) return;
     }
@@ -62,7 +70,10 @@ void CameraReader::read() {
 // The camera says how many it had no room for; what filled the room is known here, at the time.
 void CameraReader::count_drops() {
     const uint64_t more = camera_.counts().dropped - dropped_before_ - drops();
-    if (more > 0) (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
+    if (more == 0) return;
+    (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
+    monitor_.change_camera(
+        place_, [this](CameraProgress& camera) { camera.disk_drops = disk_drops_, camera.host_drops = host_drops_; });
 }
 
 // A sensor may saturate below the largest count of its format, and few cameras say where their black is: the stage does.
@@ -84,10 +95,13 @@ void CameraReader::enqueue(Frame frame) {
         news.witness.summary = summarize_frame(frame, frame.black, config_.noise);
         news.bits = bits_.read(frame);
     }
-    news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = room_](Frame* last) {
+    const size_t bytes = frame.samples.size();
+    options_.room->hold(bytes);
+    news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = options_.room, bytes](Frame* last) {
         delete last;
-        room->release();
+        room->let_go(bytes);
     });
+    monitor_.change_camera(place_, [](CameraProgress& camera) { ++camera.frames_received; });
     queue_.push(std::move(news));
 }
 

@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <semaphore>
 #include <thread>
 #include <variant>
 
@@ -14,6 +13,8 @@
 #include "record/board_log.hpp"
 #include "record/event_queue.hpp"
 #include "record/frame_bits.hpp"
+#include "record/frame_room.hpp"
+#include "record/record_monitor.hpp"
 #include "record/reorder.hpp"
 
 namespace ols {
@@ -37,7 +38,7 @@ using RecordQueue = EventQueue<RecordEvent>;
 
 struct CameraReaderOptions {
     std::optional<double> black_counts;  // measured; without it, the stage's
-    size_t frames_max = 0;               // in memory: read, and not let go of
+    std::shared_ptr<FrameRoom> room;     // for frames that are read, and not let go of
     std::function<bool()> waits_for_disk;
 };
 
@@ -46,7 +47,9 @@ class CameraReader {
     static constexpr int pause_ms = 20;
 
     // Reads into the queue until it is destroyed. The camera was started.
-    CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue);
+    // `place`: the camera's in the monitor, which knows it.
+    CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue,
+                 RecordMonitor& monitor, size_t place);
     ~CameraReader();
 
     // Frames read so far.
@@ -55,8 +58,6 @@ class CameraReader {
     uint64_t drops() const { return disk_drops_ + host_drops_; }
 
   private:
-    using Room = std::counting_semaphore<>;
-
     void read();
     void count_drops();
     void take_levels(Frame& frame) const;
@@ -66,8 +67,10 @@ class CameraReader {
     const CameraConfig& config_;
     const CameraReaderOptions options_;
     const BitsReader bits_;
-    const std::shared_ptr<Room> room_;  // frames may outlive the reader
     RecordQueue& queue_;
+    RecordMonitor& monitor_;
+    const size_t place_;
+    StageBeat& beat_;
     const uint64_t dropped_before_;
     std::atomic<uint64_t> disk_drops_ = 0, host_drops_ = 0;
     std::atomic<uint64_t> arrivals_ = 0;

@@ -37,11 +37,12 @@ IdentifyOptions identify_options(const Sequence& sequence, uint64_t camera_ns_at
 }
 
 CameraRecording::CameraRecording(const Sequence& sequence, size_t place, const RecordSink& sink,
-                                 uint64_t camera_ns_at_start, const std::atomic<bool>& stop)
+                                 uint64_t camera_ns_at_start, const std::atomic<bool>& stop, RecordMonitor& monitor)
     : sequence_(sequence),
       place_(place),
       sink_(sink),
       stop_(stop),
+      monitor_(monitor),
       identifier_(sequence, identify_options(sequence, camera_ns_at_start)),
       slots_total_(sequence.trigger_count()) {}
 
@@ -157,6 +158,11 @@ void CameraRecording::hand_on() {
             identified(frame, verdict.entry);
         }
     }
+    monitor_.change_camera(place_, [this](CameraProgress& camera) {
+        camera.slots_decided = identifier_.decided();
+        camera.missing = report_.missing;
+        camera.has_ended = finished_;
+    });
     sink_.progress(identifier_.decided(), slots_total_);
 }
 

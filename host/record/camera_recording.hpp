@@ -9,6 +9,7 @@
 #include "record/camera_reader.hpp"
 #include "record/clock_fit.hpp"
 #include "record/identify.hpp"
+#include "record/record_monitor.hpp"
 #include "record/recorder.hpp"
 
 namespace ols {
@@ -20,7 +21,7 @@ class CameraRecording {
   public:
     // `place`: the camera's among those that are recorded (LogNews::arrivals).
     CameraRecording(const Sequence& sequence, size_t place, const RecordSink& sink, uint64_t camera_ns_at_start,
-                    const std::atomic<bool>& stop);
+                    const std::atomic<bool>& stop, RecordMonitor& monitor);
 
     // Takes news, and hands on what they decide to the sink.
     void handle(RecordEvent event);
@@ -48,6 +49,7 @@ class CameraRecording {
     const size_t place_;
     const RecordSink& sink_;
     const std::atomic<bool>& stop_;
+    RecordMonitor& monitor_;
     Identifier identifier_;
     std::unordered_map<uint64_t, std::shared_ptr<Frame>> frames_;  // by arrival, until their verdict
     BitsSeen bits_seen_;

@@ -39,13 +39,19 @@ struct StartedCamera {
 // A camera that is being recorded: from its start to its report.
 class CameraTake {
   public:
-    CameraTake(const RecordedCamera& recorded, size_t place, const Sequence& sequence, const std::atomic<bool>& stop)
+    CameraTake(const RecordedCamera& recorded, size_t place, const Sequence& sequence, const std::atomic<bool>& stop,
+               RecordMonitor& monitor)
         : recorded_(recorded),
           place_(place),
           sequence_(sequence),
           stop_(stop),
+          monitor_(monitor),
+          beat_(monitor.stages().add(fmt::format("camera {} identification", place))),
+          room_(std::make_shared<FrameRoom>(frames_in_flight(sequence, recorded.sink.cycles_kept))),
           counts_before_(recorded.camera.counts()),
-          started_(recorded.camera, stop) {}
+          started_(recorded.camera, stop) {
+        monitor.add_camera(recorded.index, room_);
+    }
     ~CameraTake() {
         if (thread_.joinable()) thread_.join();
     }
@@ -57,18 +63,14 @@ class CameraTake {
     uint64_t arrivals() const { return reader_->arrivals(); }
 
     void begin(const CameraConfig& config) {
-        recording_.emplace(sequence_, place_, recorded_.sink, *started_.time_ns, stop_);
-        reader_.emplace(
-            recorded_.camera, config,
-            CameraReaderOptions{recorded_.black_counts, frames_in_flight(sequence_, recorded_.sink.cycles_kept),
-                                recorded_.sink.waits_for_disk},
-            queue_);
+        recording_.emplace(sequence_, place_, recorded_.sink, *started_.time_ns, stop_, monitor_);
+        reader_.emplace(recorded_.camera, config,
+                        CameraReaderOptions{recorded_.black_counts, room_, recorded_.sink.waits_for_disk}, queue_,
+                        monitor_, place_);
         thread_ = std::thread([this] {
-            failure_ = guarded("its frames cannot be taken", [this] {
-                while (!recording_->finished()) recording_->handle(std::move(*queue_.pop()));
-                return Status(Done{});
-            });
+            failure_ = guarded("its frames cannot be taken", [this] { return identify(), Status(Done{}); });
             has_failed_ = !failure_.ok();
+            beat_.beat(StageActivity::ended);
             queue_.close();
         });
     }
@@ -86,10 +88,22 @@ class CameraTake {
     }
 
   private:
+    void identify() {
+        while (!recording_->finished()) {
+            beat_.beat(StageActivity::waits_for_input);
+            RecordEvent event = std::move(*queue_.pop());
+            beat_.beat();
+            recording_->handle(std::move(event));
+        }
+    }
+
     const RecordedCamera& recorded_;
     const size_t place_;
     const Sequence& sequence_;
     const std::atomic<bool>& stop_;
+    RecordMonitor& monitor_;
+    StageBeat& beat_;
+    const std::shared_ptr<FrameRoom> room_;
     const CameraCounts counts_before_;
     const StartedCamera started_;
     RecordQueue queue_{SIZE_MAX};
@@ -102,7 +116,7 @@ class CameraTake {
 
 }  // namespace
 
-Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
+Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
     if (board.info().tick_hz != tick_hz)
         return fail(
             fmt::format("the board's clock runs at {} Hz and not at {}: flash the firmware of this release: "
@@ -118,10 +132,18 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
                               uint32_t(sequence.config.cycles), sequence.config.playback);
         !s.ok())
         return s;
-    if (Status s = board.arm(sequence.config.playback); !s.ok()) return s;
+    return board.arm(sequence.config.playback);
+}
+
+Status start_armed_board(Board& board) {
     Status started = board.start();
     if (!started.ok()) board.tell_to_stop();  // it may play without its answer having come
     return started;
+}
+
+Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
+    if (const Status armed = arm_board(board, sequence, stage); !armed.ok()) return armed;
+    return start_armed_board(board);
 }
 
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
@@ -129,17 +151,21 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
 }
 
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const StopRequest& stop) {
+                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor,
+                                 bool is_armed) {
+    RecordMonitor own_monitor;
+    if (!monitor) monitor = &own_monitor;
     for (const RecordedCamera& recorded : cameras)
         if (const Status status = recorded.camera.set_up(stage.cameras[recorded.index]); !status.ok())
             return status.error();
     std::deque<CameraTake> takes;
     for (const RecordedCamera& recorded : cameras) {
-        takes.emplace_back(recorded, takes.size(), sequence, stop.wanted);
+        takes.emplace_back(recorded, takes.size(), sequence, stop.wanted, *monitor);
         if (!takes.back().time_ns().ok()) return takes.back().time_ns().error();
     }
     if (stop.wanted) return fail("stopped before the take began");
-    if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
+    const Status status = is_armed ? start_armed_board(board) : start_board(board, sequence, stage);
+    if (!status.ok()) return status.error();
 
     for (size_t i = 0; i < cameras.size(); ++i) takes[i].begin(stage.cameras[cameras[i].index]);
     // With no camera left nobody would see what the board plays.
@@ -159,6 +185,7 @@ Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>
         return counts;
     };
     RecordReport report{sequence.trigger_count(), {}, {}, {}};
+    monitor->change_board([&](BoardProgress& board) { board.triggers_planned = report.slots_total; });
     {
         BoardLog log(
             board, PlayBounds(sequence), arrivals, why_stop,
@@ -168,7 +195,8 @@ Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>
             [&](const LogEnd& end) {
                 report.board_end = end.why;
                 for (CameraTake& take : takes) take.tell(end);
-            });
+            },
+            {}, monitor);
         for (CameraTake& take : takes) report.cameras.push_back(take.finish());
         report.host_clock = log.host_clock();
     }

@@ -6,7 +6,6 @@
 
 #include "program.hpp"
 #include "stagectl/session.hpp"
-#include "stagectl/stage_watch.hpp"
 #include "stagectl/verbs.hpp"
 #include "take/card.hpp"
 
@@ -31,7 +30,7 @@ Result<int> run(const Options& options) {
     const auto card =
         calibrate_with_card(*session->board, *session->cameras[0], session->stage, options.card, stop,
                             [](uint64_t decided, uint64_t total) { show_progress("calibrating", decided, total); });
-    watch->end_take();
+    say(watch->end_take());
     if (!card.ok()) return because_of(stop, card.error());
     if (Status s = write_calibration(options.output, options.card.camera, card->calibration, card->record); !s.ok())
         return s.error();

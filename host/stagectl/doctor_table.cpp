@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t line_columns = 110;
 constexpr int verdict_columns = 8;
-// By Verdict: green, yellow, red and bold, grey (ECMA-48, SGR).
+// By CheckVerdict: green, yellow, red and bold, grey (ECMA-48, SGR).
 constexpr const char* colours[] = {"\033[32m", "\033[33m", "\033[1;31m", "\033[90m"};
 constexpr const char* plain = "\033[0m";
 
@@ -48,7 +48,7 @@ std::string row_of(const Finding& finding, size_t title_columns, bool is_coloure
     std::string row = fmt::format("{}{:<{}}{}{:<{}}  {}\n", is_coloured ? colours[verdict] : "", verdict_names[verdict],
                                   verdict_columns, is_coloured ? plain : "", title, title_columns,
                                   wrapped(finding.found, indent, std::max(indent, verdict_columns + title.size() + 2)));
-    if (finding.verdict != Verdict::warn && finding.verdict != Verdict::fail) return row;
+    if (finding.verdict != CheckVerdict::warn && finding.verdict != CheckVerdict::fail) return row;
     constexpr size_t below = verdict_columns + 8;
     row += fmt::format("{:{}}needed: {}\n", "", verdict_columns, wrapped(finding.needed, below, below));
     bool is_repeated = false;
@@ -71,13 +71,13 @@ std::string doctor_table(const Findings& findings, bool is_coloured) {
     std::string table;
     std::set<std::string> said;
     for (const Finding& finding : findings) table += row_of(finding, title_columns, is_coloured, said);
-    const auto counted = [&findings](Verdict verdict, const char* word) {
+    const auto counted = [&findings](CheckVerdict verdict, const char* word) {
         const size_t count = count_of(findings, verdict);
         return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
     };
-    return table + fmt::format("\n{} ok, {}, {}, {} not checked\n", count_of(findings, Verdict::ok),
-                               counted(Verdict::warn, "warning"), counted(Verdict::fail, "failure"),
-                               count_of(findings, Verdict::skipped));
+    return table + fmt::format("\n{} ok, {}, {}, {} not checked\n", count_of(findings, CheckVerdict::ok),
+                               counted(CheckVerdict::warn, "warning"), counted(CheckVerdict::fail, "failure"),
+                               count_of(findings, CheckVerdict::skipped));
 }
 
 nlohmann::json doctor_json(const Findings& findings) {
@@ -91,7 +91,7 @@ nlohmann::json doctor_json(const Findings& findings) {
                           {"commands", finding.commands}});
     nlohmann::json counts = nlohmann::json::object();
     for (size_t n = 0; n < verdict_names.size(); ++n)
-        counts[std::string(verdict_names[n])] = count_of(findings, Verdict(n));
+        counts[std::string(verdict_names[n])] = count_of(findings, CheckVerdict(n));
     return {{"checks", checks}, {"counts", counts}};
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "daemon/disk_forecast.hpp"
 #include "doctor/check_up.hpp"
 #include "program.hpp"
 #include "stagectl/doctor_table.hpp"
@@ -55,7 +56,13 @@ Result<StageNeeds> needs_of(const Options& options, const StageConfig& stage) {
     if (wanted.path.empty() && wanted.basis.empty()) wanted.basis = SequenceConfig{}.basis;
     const auto sequence = open_compiled(wanted, -1, stage);
     if (!sequence.ok()) return sequence.error();
-    return needs_of(stage, *sequence, options.take_s, options.target_rate_hz);
+    TakeTargets targets;
+    targets.every = options.target_rate_hz > 0 ? 1 : 0;  // of a performance, which has more beside its lamps
+    std::vector<uint64_t> target_bytes;
+    if (sequence->is_capture())
+        for (size_t camera = 0; camera < stage.cameras.size(); ++camera)
+            target_bytes.push_back(target_bytes_max(*sequence, stage, camera, targets, false));
+    return needs_of(stage, *sequence, options.take_s, options.target_rate_hz, target_bytes);
 }
 
 bool is_coloured() {

@@ -19,8 +19,7 @@ void add_to_account(LineFile& account, const Frame& frame) {
 }  // namespace
 
 void say_targets(const TakeOptions& options, const Sequence& sequence, const TakeTargets& targets) {
-    for (const std::string& note : notes_on_targets(options, sequence, targets))
-        fmt::print(stderr, "stagectl: {}\n", note);
+    say(notes_on_targets(options, sequence, targets));
 }
 
 TakeSinks sinks_of(std::vector<PlannedArchive>& planned, const TakeOptions& options, std::optional<LineFile>& account,

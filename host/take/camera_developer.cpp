@@ -31,11 +31,12 @@ int64_t count(MaskBit bit, const Target& target, double& worst) {
 }  // namespace
 
 CameraDeveloper::CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera,
-                                 TargetWriter& writer)
+                                 TargetWriter& writer, OutputMonitor& monitor)
     : take_(take),
       camera_(camera),
       is_performance_(targets.every > 0),
       writer_(writer),
+      monitor_(monitor),
       developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
                  {take.masks.estimate, take.stage.lamps, 0, take.witness_step}),
       motion_developer_(take.sequence, take.calibration.cameras[camera], take.stage.cameras[camera].noise,
@@ -71,6 +72,7 @@ void CameraDeveloper::hand_on(uint64_t decided) {
             continue;
         }
         flush_lost();
+        monitor_.hand_on(camera_, plan_[next_].frames.last + 1);
         work_.push(std::move(job));
     }
 }
@@ -99,17 +101,26 @@ CameraDeveloper::Report CameraDeveloper::finish() {
 }
 
 void CameraDeveloper::develop() {
-    while (auto work = work_.pop()) {
+    StageBeat& beat = monitor_.developer_beat(camera_);
+    for (;;) {
+        beat.beat(StageActivity::waits_for_input);
+        auto work = work_.pop();
+        if (!work) break;
+        beat.beat();
         if (auto* lost = std::get_if<LostTargets>(&*work)) {
             writer_.add(std::move(*lost));
             continue;
         }
         const auto start = std::chrono::steady_clock::now();
+        const uint64_t until = plan_[std::get<Job>(*work).index].frames.last + 1;
         TargetOutcome outcome = develop(std::get<Job>(*work));
         work.reset();  // its memory takes the camera's next frames
         report_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        monitor_.develop(camera_, until, outcome.target != nullptr);
+        beat.beat(StageActivity::waits_for_room);
         writer_.add(std::move(outcome));
     }
+    beat.beat(StageActivity::ended);
 }
 
 TargetOutcome CameraDeveloper::develop(const Job& job) {

@@ -26,7 +26,8 @@ class CameraDeveloper {
     };
 
     // `camera`: its place among the stage's. References must outlive the developer.
-    CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera, TargetWriter& writer);
+    CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera, TargetWriter& writer,
+                    OutputMonitor& monitor);
     ~CameraDeveloper() { (void)finish(); }
 
     size_t target_count() const { return plan_.size(); }
@@ -63,6 +64,7 @@ class CameraDeveloper {
     const uint32_t camera_;
     const bool is_performance_;
     TargetWriter& writer_;
+    OutputMonitor& monitor_;
     Developer developer_;
     MotionDeveloper motion_developer_;
     const std::vector<PlannedTarget> plan_;

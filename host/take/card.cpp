@@ -127,7 +127,8 @@ Status check_card(const Average& card, const Image& above_black, double range, d
 
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
                                             const CardOptions& options, const StopRequest& stop,
-                                            const std::function<void(uint64_t, uint64_t)>& progress) {
+                                            const std::function<void(uint64_t, uint64_t)>& progress,
+                                            RecordMonitor* monitor) {
     const CameraConfig& config = stage.cameras[options.camera];
     const Sequence sequence = card_sequence(stage, options);
     Average card(config), dark(config);
@@ -137,7 +138,8 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
                               if (kind == SlotKind::dark) dark.add(*frame);
                           },
                           [](const MissingSlot&) {}, progress};
-    const auto report = record_take(board, {{camera, options.camera, std::nullopt, sink}}, sequence, stage, stop);
+    const auto report =
+        record_take(board, {{camera, options.camera, std::nullopt, sink}}, sequence, stage, stop, monitor);
     if (!report.ok()) return report.error();
     if (card.frames() == 0 || dark.frames() == 0)
         return fail(fmt::format(

@@ -28,9 +28,10 @@ struct CardCalibration {
 // with the root of their number) and divides by the light that falls on a card that faces the camera:
 // F = (card - black) / (t rho sum over lamps of max(0, n . l)). One average for the whole view; the card must fill it.
 // Errors: a saturated sample, a card darker than a tenth of the range, a view that the card does not fill, missing
-// frames of a kind.
+// frames of a kind. `monitor`: as record_take()'s.
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
                                             const CardOptions& options, const StopRequest& stop,
-                                            const std::function<void(uint64_t, uint64_t)>& progress);
+                                            const std::function<void(uint64_t, uint64_t)>& progress,
+                                            RecordMonitor* monitor = nullptr);
 
 }  // namespace ols

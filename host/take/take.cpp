@@ -31,10 +31,15 @@ size_t cycles_kept(const TakeMasks& masks, const std::vector<TakeOutput>& output
 // An archive that is being made of the recording: each camera's frames are developed beside the others', and one writes.
 class Output {
   public:
-    Output(const TakeDescription& take, const TakeOutput& output)
-        : archive_(output.archive), targets_(output.targets), writer_(output.archive) {
-        for (uint32_t camera = 0; camera < take.stage.cameras.size(); ++camera)
-            developers_.emplace_back(take, targets_, camera, writer_);
+    Output(const TakeDescription& take, const TakeOutput& output, TakeMonitor& monitor)
+        : archive_(output.archive),
+          targets_(output.targets),
+          monitor_(monitor.add_output(take.stage.cameras.size(), take.sequence.slots.front().period_ticks)),
+          writer_(output.archive, monitor_) {
+        for (uint32_t camera = 0; camera < take.stage.cameras.size(); ++camera) {
+            developers_.emplace_back(take, targets_, camera, writer_, monitor_);
+            monitor_.plan(developers_.back().target_count());
+        }
     }
 
     Status begin() {
@@ -88,6 +93,7 @@ class Output {
   private:
     ArchiveWriter& archive_;
     const TakeTargets targets_;
+    OutputMonitor& monitor_;
     TargetWriter writer_;
     std::deque<CameraDeveloper> developers_;  // of the stage's cameras
 };
@@ -157,11 +163,11 @@ namespace {
 // `record_into` records into the cameras' sinks, from whatever the take comes.
 template <typename Record>
 Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::json& origin, const TakeSinks& sinks,
-                                const Record& record_into) {
+                                TakeMonitor& monitor, const Record& record_into) {
     const size_t cameras = take.stage.cameras.size();
     const auto start = std::chrono::steady_clock::now();
     std::vector<std::unique_ptr<Output>> outputs;
-    for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output));
+    for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output, monitor));
     for (const auto& output : outputs)
         if (const auto begun = output->begin(); !begun) return begun.error();
 
@@ -209,19 +215,24 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
             fmt::format("the stage has {} cameras, and {} are there: a take needs them all, or a stage without "
                         "the others' [[camera]]",
                         take.stage.cameras.size(), cameras));
-    return develop_take(take, origin_of(devices.board), sinks, [&](const std::vector<RecordSink>& camera_sinks) {
-        std::vector<RecordedCamera> recorded;
-        for (size_t camera = 0; camera < cameras; ++camera)
-            recorded.push_back({*devices.cameras[camera], uint32_t(camera), measured_black(take.calibration, camera),
-                                camera_sinks[camera]});
-        return record_take(devices.board, recorded, take.sequence, take.stage, stop);
-    });
+    TakeMonitor own_monitor;
+    TakeMonitor& monitor = sinks.monitor ? *sinks.monitor : own_monitor;
+    return develop_take(take, origin_of(devices.board), sinks, monitor,
+                        [&](const std::vector<RecordSink>& camera_sinks) {
+                            std::vector<RecordedCamera> recorded;
+                            for (size_t camera = 0; camera < cameras; ++camera)
+                                recorded.push_back({*devices.cameras[camera], uint32_t(camera),
+                                                    measured_black(take.calibration, camera), camera_sinks[camera]});
+                            return record_take(devices.board, recorded, take.sequence, take.stage, stop,
+                                               &monitor.record(), devices.is_armed);
+                        });
 }
 
 Result<TakeReport> ingest_take(const TakeDescription& take, const RecordedFrames& frames, const RecordingPlace& place,
                                const TakeSinks& sinks, const std::atomic<bool>& stop) {
+    TakeMonitor own_monitor;
     return develop_take(take, origin_of(frames, place, take.sequence), sinks,
-                        [&](const std::vector<RecordSink>& camera_sinks) {
+                        sinks.monitor ? *sinks.monitor : own_monitor, [&](const std::vector<RecordSink>& camera_sinks) {
                             return record_files(frames, place, take.sequence, take.stage.cameras[0],
                                                 measured_black(take.calibration, 0), camera_sinks[0], stop);
                         });

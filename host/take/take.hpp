@@ -13,7 +13,9 @@
 #include "develop/motion_developer.hpp"
 #include "record/file_recording.hpp"
 #include "record/recorder.hpp"
+#include "record/take_memory.hpp"
 #include "stage/calibration.hpp"
+#include "take/take_monitor.hpp"
 
 namespace ols {
 
@@ -40,12 +42,14 @@ struct TakeDescription {
     TakeMasks masks;
     std::vector<std::string> witnesses = {"board log", "camera id and time", "optical code"};  // that every frame has
     int witness_step = 5;  // DevelopOptions::witness_step
+    TakeMemory memory = {};
 };
 
 // What it is recorded with.
 struct TakeDevices {
     Board& board;
     std::vector<Camera*> cameras;  // the stage's, in their order
+    bool is_armed = false;         // the board has the sequence (arm_board())
 };
 
 // One archive that is made of the recording.
@@ -63,6 +67,7 @@ struct TakeSinks {
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
     // Of what else watched the stage, for the manifest: asked once it is recorded.
     std::function<nlohmann::json()> account = {};
+    TakeMonitor* monitor = nullptr;  // of this take, for others to look at while it runs; may be null
 };
 
 // What the targets' own samples said against slots and lamps (develop/target_witnesses.hpp).

@@ -17,7 +17,12 @@ TargetWriter::Report TargetWriter::finish() {
 }
 
 void TargetWriter::write() {
-    while (const auto work = work_.pop()) {
+    StageBeat& beat = monitor_.writer_beat();
+    for (;;) {
+        beat.beat(StageActivity::waits_for_input);
+        const auto work = work_.pop();
+        if (!work) break;
+        beat.beat();
         const auto start = std::chrono::steady_clock::now();
         const Status status = guarded("cannot write to the archive", [&] {
             return std::visit([this](const auto& one) { return write(one); }, *work);
@@ -25,23 +30,33 @@ void TargetWriter::write() {
         if (!status.ok() && report_.error.empty()) report_.error = status.error().message;
         report_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     }
+    beat.beat(StageActivity::ended);
+}
+
+void TargetWriter::count_missing(uint32_t targets) {
+    report_.missing += int(targets);
+    monitor_.miss(targets);
 }
 
 Status TargetWriter::write(const TargetOutcome& outcome) {
     if (!outcome.target) {
-        ++report_.missing;
+        count_missing(1);
         return archive_.note_missing_target(outcome.camera, outcome.index, outcome.why, outcome.detail);
     }
     const Status written = archive_.write_target(*outcome.target);
-    ++(written.ok() ? report_.written : report_.missing);
-    if (written.ok()) return written;
+    if (written.ok()) {
+        ++report_.written;
+        monitor_.write();
+        return written;
+    }
+    count_missing(1);
     // That it is noted, or will be, is for the archive; what the user must hear of first is the disk.
     (void)archive_.note_missing_target(outcome.camera, outcome.index, written.error().message, outcome.detail);
     return fail(fmt::format("target {}: {}", outcome.index, written.error().message));
 }
 
 Status TargetWriter::write(const LostTargets& run) {
-    report_.missing += int(run.last - run.first + 1);
+    count_missing(run.last - run.first + 1);
     return archive_.note_missing_targets(run.camera, run.first, run.last, run.why);
 }
 

@@ -10,6 +10,7 @@
 
 #include "archive/archive.hpp"
 #include "record/event_queue.hpp"
+#include "take/take_monitor.hpp"
 
 namespace ols {
 
@@ -35,7 +36,8 @@ class TargetWriter {
         std::string error;  // what could not be written first, and why
     };
 
-    explicit TargetWriter(ArchiveWriter& archive) : archive_(archive), thread_([this] { write(); }) {}
+    TargetWriter(ArchiveWriter& archive, OutputMonitor& monitor)
+        : archive_(archive), monitor_(monitor), thread_([this] { write(); }) {}
     ~TargetWriter() { (void)finish(); }
 
     // Each waits while the one before the last is written. Outcomes of one camera come in order.
@@ -59,11 +61,13 @@ class TargetWriter {
         --waiting_;
     }
     void write();
+    void count_missing(uint32_t targets);
     Status write(TakePlace) { return archive_.take_place(); }
     Status write(const TargetOutcome& outcome);
     Status write(const LostTargets& run);
 
     ArchiveWriter& archive_;
+    OutputMonitor& monitor_;
     Report report_;  // the thread's until it has ended
     EventQueue<Work> work_{1};
     std::atomic<int> waiting_ = 0;

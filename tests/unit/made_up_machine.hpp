@@ -76,11 +76,11 @@ class DoctorTest : public ScratchFolder {
         if (!found) throw std::runtime_error("no finding of " + std::string(check_names[size_t(check)].id));
         return *found;
     }
-    static void expect(const Findings& findings, Check check, Verdict verdict, const std::string& words = "") {
+    static void expect(const Findings& findings, Check check, CheckVerdict verdict, const std::string& words = "") {
         const Finding& finding = only(findings, check);
         EXPECT_EQ(finding.verdict, verdict) << finding.id() << ": " << finding.found;
         EXPECT_NE(finding.found.find(words), std::string::npos) << finding.id() << ": " << finding.found;
-        const bool wants_help = verdict == Verdict::warn || verdict == Verdict::fail;
+        const bool wants_help = verdict == CheckVerdict::warn || verdict == CheckVerdict::fail;
         if (wants_help) {
             EXPECT_FALSE(finding.commands.empty()) << finding.id();
         }

@@ -19,8 +19,11 @@ class Reading : public testing::Test {
         config_.width = 16, config_.height = 8;
         ASSERT_TRUE(camera_.set_up(config_).ok());
         ASSERT_TRUE(camera_.start().ok());
+        const auto frames = std::make_shared<FrameRoom>(frames_max);
+        monitor_.add_camera(0, frames);
         reader_.emplace(camera_, config_,
-                        CameraReaderOptions{std::nullopt, frames_max, [this] { return disk_is_late_.load(); }}, queue_);
+                        CameraReaderOptions{std::nullopt, frames, [this] { return disk_is_late_.load(); }}, queue_,
+                        monitor_, 0);
     }
     // The next frame; pauses before it are left out.
     FrameNews next_frame() {
@@ -32,9 +35,12 @@ class Reading : public testing::Test {
     void expose(int count) {
         for (int n = 0; n < count; ++n) camera_.trigger();
     }
-    // Until the reader, which looks while it has no room, knows of so many.
+    // Until the reader, which looks while it has no room, has told of so many.
     void wait_for_drops(uint64_t count) const {
-        while (reader_->drops() < count) std::this_thread::yield();
+        for (uint64_t drops = 0; drops < count; std::this_thread::yield()) {
+            const CameraProgress camera = monitor_.progress().cameras[0];
+            drops = camera.host_drops + camera.disk_drops;
+        }
     }
 
     static FakeOptions options() {
@@ -46,6 +52,7 @@ class Reading : public testing::Test {
     CameraConfig config_;
     FakeCamera camera_{options()};
     std::atomic<bool> disk_is_late_ = false;
+    RecordMonitor monitor_;
     RecordQueue queue_{SIZE_MAX};
     std::optional<CameraReader> reader_;
 };
@@ -61,9 +68,17 @@ TEST_F(Reading, no_more_frames_are_held_than_may_be_and_what_is_dropped_meanwhil
     expose(room + 5);  // nothing is read any more: the camera keeps four and drops five
     wait_for_drops(5);
     EXPECT_EQ(reader_->arrivals(), frames_max);
+    CameraProgress live = monitor_.progress().cameras[0];
+    EXPECT_EQ(live.frames_received, frames_max);
+    EXPECT_EQ(live.room.frames_in_memory, frames_max);
+    EXPECT_EQ(live.room.bytes_in_memory, frames_max * 16 * 8 * 2);
+    EXPECT_EQ(live.host_drops, 5u);
     disk_is_late_ = true;
     expose(2);
     wait_for_drops(7);
+    live = monitor_.progress().cameras[0];
+    EXPECT_EQ(live.host_drops, 5u);
+    EXPECT_EQ(live.disk_drops, 2u);
     held.clear();
     for (size_t n = 0; n < room; ++n) {
         const FrameNews news = next_frame();

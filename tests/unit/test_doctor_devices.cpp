@@ -30,14 +30,15 @@ class PermissionsOfAStage : public DoctorTest {
 };
 
 TEST_F(PermissionsOfAStage, without_devices_are_not_looked_at) {
-    for (const Finding& finding : check_permissions(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.id();
+    for (const Finding& finding : check_permissions(up))
+        EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.id();
 }
 
 TEST_F(PermissionsOfAStage, need_the_rules_of_this_release) {
     up.board_link = "usb:";
-    expect(check_permissions(up), Check::udev_rules, Verdict::fail, "no 60-open-light-stage.rules");
+    expect(check_permissions(up), Check::udev_rules, CheckVerdict::fail, "no 60-open-light-stage.rules");
     put("/usr/local/lib/udev/rules.d/60-open-light-stage.rules", "# someone's own words\n\n" + rules_of_this_release());
-    expect(check_permissions(up), Check::udev_rules, Verdict::ok, "/usr/local/lib/udev/rules.d/");
+    expect(check_permissions(up), Check::udev_rules, CheckVerdict::ok, "/usr/local/lib/udev/rules.d/");
 }
 
 // A file in /etc hides those of its name.
@@ -45,52 +46,52 @@ TEST_F(PermissionsOfAStage, are_those_of_the_file_that_udev_reads) {
     up.board_link = "usb:";
     put("/usr/lib/udev/rules.d/60-open-light-stage.rules", rules_of_this_release());
     put("/etc/udev/rules.d/60-open-light-stage.rules", "SUBSYSTEM==\"usb\", MODE=\"0660\"\n");
-    expect(check_permissions(up), Check::udev_rules, Verdict::warn, "/etc/udev/rules.d/");
+    expect(check_permissions(up), Check::udev_rules, CheckVerdict::warn, "/etc/udev/rules.d/");
 }
 
 TEST_F(PermissionsOfAStage, name_the_group_that_is_missing) {
     give_camera("v4l2:0", 1);
     put("/dev/video0", "");
-    expect(check_permissions(up), Check::groups, Verdict::warn, "ada is not in it");
+    expect(check_permissions(up), Check::groups, CheckVerdict::warn, "ada is not in it");
     EXPECT_NE(only(check_permissions(up), Check::groups).commands[0].find("usermod -aG video ada"), std::string::npos);
     put("/etc/group", "video:x:44:ben,ada\nada:x:1000:\n");
-    expect(check_permissions(up), Check::groups, Verdict::warn, "not yet in this login");
+    expect(check_permissions(up), Check::groups, CheckVerdict::warn, "not yet in this login");
     be_user("1000", "44 1000", 0);
-    expect(check_permissions(up), Check::groups, Verdict::ok);
+    expect(check_permissions(up), Check::groups, CheckVerdict::ok);
 }
 
 TEST_F(PermissionsOfAStage, of_root_say_nothing_of_who_records) {
     give_camera("v4l2:0", 1);
     be_user("0", "0", ~uint64_t(0));
-    expect(check_permissions(up), Check::groups, Verdict::skipped, "run doctor as the user");
+    expect(check_permissions(up), Check::groups, CheckVerdict::skipped, "run doctor as the user");
 }
 
 TEST_F(PermissionsOfAStage, include_every_node_that_is_named) {
     give_camera("v4l2:2", 1);
-    expect(check_permissions(up), Check::nodes, Verdict::fail, "no such node");
+    expect(check_permissions(up), Check::nodes, CheckVerdict::fail, "no such node");
     put("/dev/video2", "");
-    expect(check_permissions(up), Check::nodes, Verdict::ok);
+    expect(check_permissions(up), Check::nodes, CheckVerdict::ok);
     machine.closed = {"/dev/video2"};
-    expect(check_permissions(up), Check::nodes, Verdict::fail, "ada may not open it");
+    expect(check_permissions(up), Check::nodes, CheckVerdict::fail, "ada may not open it");
 }
 
 TEST_F(PermissionsOfAStage, include_the_board_on_usb_and_no_other_device) {
     up.board_link = "usb:";
     plug_in("1-2", "1209", "0001", "someone else's");
-    expect(check_permissions(up), Check::nodes, Verdict::skipped);
+    expect(check_permissions(up), Check::nodes, CheckVerdict::skipped);
     plug_in("1-2", "1209", "0001", "light stage sequencer");
     machine.closed = {"/dev/bus/usb/001/007"};
-    expect(check_permissions(up), Check::nodes, Verdict::fail);
+    expect(check_permissions(up), Check::nodes, CheckVerdict::fail);
 }
 
 TEST_F(PermissionsOfAStage, include_a_usb3_camera_by_the_class_of_its_interface) {
     give_camera("aravis:SN8", 1, {{"id", "maker", "model", "SN8", "", "USB3Vision"}});
     plug_in("2-1", "abcd", "0001", "camera");
-    expect(check_permissions(up), Check::nodes, Verdict::skipped);
+    expect(check_permissions(up), Check::nodes, CheckVerdict::skipped);
     put("/sys/bus/usb/devices/2-1:1.0/bInterfaceClass", "ef\n");
     put("/sys/bus/usb/devices/2-1:1.0/bInterfaceSubClass", "05\n");
     put("/sys/bus/usb/devices/2-1:1.0/bInterfaceProtocol", "00\n");
-    expect(check_permissions(up), Check::nodes, Verdict::ok);
+    expect(check_permissions(up), Check::nodes, CheckVerdict::ok);
 }
 
 class CanOfAStage : public DoctorTest {
@@ -108,61 +109,61 @@ class CanOfAStage : public DoctorTest {
 
 TEST_F(CanOfAStage, is_not_looked_at_without_one) {
     up.board_link = "can-socket:/run/can.sock";
-    for (const Finding& finding : check_can(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.id();
+    for (const Finding& finding : check_can(up)) EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.id();
 }
 
 TEST_F(CanOfAStage, is_well) {
     put_interface("0x40041", "1000");
     machine.links["can0"] = {"can", 1'000'000, false};
     put("/sys/module/can_isotp/version", "");
-    for (const Finding& finding : check_can(up)) EXPECT_EQ(finding.verdict, Verdict::ok) << finding.id();
+    for (const Finding& finding : check_can(up)) EXPECT_EQ(finding.verdict, CheckVerdict::ok) << finding.id();
 }
 
 TEST_F(CanOfAStage, is_there_of_the_right_kind_and_up) {
-    expect(check_can(up), Check::can_interface, Verdict::fail, "no such interface");
+    expect(check_can(up), Check::can_interface, CheckVerdict::fail, "no such interface");
     put_interface("0x1003", "1000", 1);
-    expect(check_can(up), Check::can_interface, Verdict::fail, "no CAN interface");
+    expect(check_can(up), Check::can_interface, CheckVerdict::fail, "no CAN interface");
     put_interface("0x40040", "1000");
-    expect(check_can(up), Check::can_interface, Verdict::fail, "down");
+    expect(check_can(up), Check::can_interface, CheckVerdict::fail, "down");
     put_interface("0x40041", "1000");
     machine.links["can0"] = {"can", 1'000'000, true};
-    expect(check_can(up), Check::can_interface, Verdict::fail, "bus off");
+    expect(check_can(up), Check::can_interface, CheckVerdict::fail, "bus off");
 }
 
 TEST_F(CanOfAStage, has_the_bit_rate_of_the_boards) {
     put_interface("0x40041", "1000");
     machine.links["can0"] = {"can", 250'000, false};
-    expect(check_can(up), Check::can_bit_rate, Verdict::fail, "250000");
+    expect(check_can(up), Check::can_bit_rate, CheckVerdict::fail, "250000");
     machine.links["can0"] = {"can", 500'000, false};
-    expect(check_can(up), Check::can_bit_rate, Verdict::warn);
+    expect(check_can(up), Check::can_bit_rate, CheckVerdict::warn);
     machine.links["can0"] = {"vcan", 0, false};
-    expect(check_can(up), Check::can_bit_rate, Verdict::skipped, "vcan");
+    expect(check_can(up), Check::can_bit_rate, CheckVerdict::skipped, "vcan");
 }
 
 TEST_F(CanOfAStage, has_a_queue_for_a_message) {
     put_interface("0x40041", "10");
-    expect(check_can(up), Check::can_queue, Verdict::warn, "10 frames");
+    expect(check_can(up), Check::can_queue, CheckVerdict::warn, "10 frames");
     put_interface("0x40041", "155");
-    expect(check_can(up), Check::can_queue, Verdict::ok);
+    expect(check_can(up), Check::can_queue, CheckVerdict::ok);
 }
 
 TEST_F(CanOfAStage, has_isotp_built_in_loaded_or_to_be_loaded) {
-    expect(check_can(up), Check::can_isotp, Verdict::warn, "6.1.0");
+    expect(check_can(up), Check::can_isotp, CheckVerdict::warn, "6.1.0");
     put("/lib/modules/6.1.0/modules.dep", "kernel/net/can/can-raw.ko: kernel/net/can/can.ko\n");
-    expect(check_can(up), Check::can_isotp, Verdict::warn);
+    expect(check_can(up), Check::can_isotp, CheckVerdict::warn);
     put("/lib/modules/6.1.0/modules.dep", "kernel/net/can/can-isotp.ko.xz: kernel/net/can/can.ko\n");
-    expect(check_can(up), Check::can_isotp, Verdict::ok, "when it is asked for");
+    expect(check_can(up), Check::can_isotp, CheckVerdict::ok, "when it is asked for");
     put("/lib/modules/6.1.0/modules.builtin", "kernel/net/can/can-isotp.ko\n");
-    expect(check_can(up), Check::can_isotp, Verdict::ok, "built");
+    expect(check_can(up), Check::can_isotp, CheckVerdict::ok, "built");
 }
 
 TEST_F(CanOfAStage, includes_the_lamp_nodes) {
     up.board_link = "usb:";
     up.stage.telemetry.bus = "can:can1";
     const Findings findings = check_can(up);
-    expect(findings, Check::can_interface, Verdict::fail);
+    expect(findings, Check::can_interface, CheckVerdict::fail);
     EXPECT_EQ(only(findings, Check::can_interface).subject, "can1");
-    expect(findings, Check::can_isotp, Verdict::skipped);
+    expect(findings, Check::can_isotp, CheckVerdict::skipped);
 }
 
 class DevicesOfAStage : public DoctorTest {};
@@ -170,15 +171,15 @@ class DevicesOfAStage : public DoctorTest {};
 TEST_F(DevicesOfAStage, that_are_not_named_are_skipped) {
     give_camera("", 1);
     for (const auto family : {check_board, check_cameras, check_gpio})
-        for (const Finding& finding : family(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.id();
+        for (const Finding& finding : family(up)) EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.id();
 }
 
 TEST_F(DevicesOfAStage, a_board_that_does_not_answer_fails_and_nothing_is_said_of_it) {
     up.board_link = "usb:";
     const Findings findings = check_board(up);
-    expect(findings, Check::board_link, Verdict::fail, "no board in this test");
-    expect(findings, Check::board_firmware, Verdict::skipped);
-    expect(findings, Check::board_fault, Verdict::skipped);
+    expect(findings, Check::board_link, CheckVerdict::fail, "no board in this test");
+    expect(findings, Check::board_firmware, CheckVerdict::skipped);
+    expect(findings, Check::board_fault, CheckVerdict::skipped);
 }
 
 class BoardOfAStage : public DoctorTest {
@@ -202,59 +203,59 @@ class BoardOfAStage : public DoctorTest {
 
 TEST_F(BoardOfAStage, is_well_when_idle_and_of_this_release) {
     const Findings findings = check_board(up);
-    expect(findings, Check::board_link, Verdict::ok, "1011121314151617");
-    expect(findings, Check::board_firmware, Verdict::ok, "pico");
-    expect(findings, Check::board_fault, Verdict::ok, "idle");
+    expect(findings, Check::board_link, CheckVerdict::ok, "1011121314151617");
+    expect(findings, Check::board_firmware, CheckVerdict::ok, "pico");
+    expect(findings, Check::board_fault, CheckVerdict::ok, "idle");
 }
 
 TEST_F(BoardOfAStage, of_another_release_is_warned_of) {
     std::strcpy(hello_.firmware_version, "9.9.9");
-    expect(check_board(up), Check::board_firmware, Verdict::warn, "9.9.9");
+    expect(check_board(up), Check::board_firmware, CheckVerdict::warn, "9.9.9");
 }
 
 TEST_F(BoardOfAStage, with_another_chain_can_not_play) {
     hello_.chain_bits = 96;
-    expect(check_board(up), Check::board_firmware, Verdict::fail, "chain of 96 bits");
+    expect(check_board(up), Check::board_firmware, CheckVerdict::fail, "chain of 96 bits");
 }
 
 TEST_F(BoardOfAStage, with_a_latched_fault_names_it) {
     status_.state = OLS_STATE_FAULT;
     status_.fault = OLS_FAULT_SLIPPED;
-    expect(check_board(up), Check::board_fault, Verdict::fail, "slipped");
+    expect(check_board(up), Check::board_fault, CheckVerdict::fail, "slipped");
     EXPECT_NE(only(check_board(up), Check::board_fault).commands[0].find("--clear-fault"), std::string::npos);
 }
 
 TEST_F(BoardOfAStage, that_plays_belongs_to_a_take) {
     for (const uint8_t state : {OLS_STATE_ARMED, OLS_STATE_PLAYING, OLS_STATE_WAITING}) {
         status_.state = state;
-        expect(check_board(up), Check::board_fault, Verdict::warn);
+        expect(check_board(up), Check::board_fault, CheckVerdict::warn);
     }
 }
 
 TEST_F(DevicesOfAStage, a_camera_is_opened_and_set_up) {
     give_camera("fake:100", 1);
     const Findings findings = check_cameras(up);
-    expect(findings, Check::camera_link, Verdict::ok, "fake:100");
-    expect(findings, Check::camera_setup, Verdict::ok, "640 x 480, 12 bits");
+    expect(findings, Check::camera_link, CheckVerdict::ok, "fake:100");
+    expect(findings, Check::camera_setup, CheckVerdict::ok, "640 x 480, 12 bits");
 }
 
 TEST_F(DevicesOfAStage, a_camera_that_takes_another_size_fails_by_its_key) {
     give_camera("fake:100", 1);
     up.stage.cameras[0].width = 8192;
-    expect(check_cameras(up), Check::camera_setup, Verdict::fail, "width");
+    expect(check_cameras(up), Check::camera_setup, CheckVerdict::fail, "width");
 }
 
 TEST_F(DevicesOfAStage, a_camera_that_is_not_there_fails_and_is_not_set_up) {
     give_camera("ring:/no/such/ring", 1);
     const Findings findings = check_cameras(up);
-    expect(findings, Check::camera_link, Verdict::fail);
-    expect(findings, Check::camera_setup, Verdict::skipped);
+    expect(findings, Check::camera_link, CheckVerdict::fail);
+    expect(findings, Check::camera_setup, CheckVerdict::skipped);
 }
 
 TEST_F(DevicesOfAStage, a_line_of_a_chip_that_is_not_there_fails) {
     up.stage.gpio.chip = "no-such-chip";
     up.stage.gpio.arm = GpioLineSetup{};
-    expect(check_gpio(up), Check::gpio_lines, Verdict::fail, "no GPIO chip 'no-such-chip'");
+    expect(check_gpio(up), Check::gpio_lines, CheckVerdict::fail, "no GPIO chip 'no-such-chip'");
 }
 
 TEST_F(DevicesOfAStage, a_camera_of_no_name_is_the_only_one_there_is) {

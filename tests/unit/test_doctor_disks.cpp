@@ -35,18 +35,16 @@ class DisksOfAStage : public DoctorTest {
     const std::string disk_ = folder_ / "disk";
 };
 
-// A cycle of `single` is 180 slots; the paper's camera is 640 x 480 at 2160 frames/s: 1.33 GB/s (design of the stage), 95.8 MB of
-// lamps a target.
+// The paper's camera is 640 x 480 at 2160 frames/s: 1.33 GB/s.
 TEST(NeedsOfAStage, are_those_of_the_papers_camera) {
     const StageConfig stage = default_stage();
     const auto sequence = compile_sequence(SequenceConfig{}, stage);
     ASSERT_TRUE(sequence.ok());
-    const StageNeeds needs = needs_of(stage, *sequence, 10, 0);
+    const StageNeeds needs = needs_of(stage, *sequence, 10, 0, {100'000'000});
     EXPECT_NEAR(needs.raw_bytes_per_s(), 640 * 480 * 2 * 2160.0, 1e5);
-    EXPECT_EQ(needs.cameras[0].target_bytes, 640u * 480 * (156 * 2 + 8));
     EXPECT_NEAR(needs.cycle_s, double(sequence->slots.size()) / 2160, 1e-6);
-    EXPECT_NEAR(needs.archive_bytes_per_s(), double(needs.cameras[0].target_bytes) * needs.targets_per_s, 1);
-    EXPECT_NEAR(needs_of(stage, *sequence, 10, 24).archive_bytes_per_s(), 640.0 * 480 * 320 * 24, 1);
+    EXPECT_NEAR(needs.archive_bytes_per_s(), 1e8 / needs.cycle_s, 1);
+    EXPECT_NEAR(needs_of(stage, *sequence, 10, 24, {100'000'000}).archive_bytes_per_s(), 2.4e9, 1);
 }
 
 TEST(NeedsOfAStage, count_each_camera_by_its_trigger_line_and_samples) {
@@ -57,22 +55,22 @@ TEST(NeedsOfAStage, count_each_camera_by_its_trigger_line_and_samples) {
     stage.cameras[1].cfa = Cfa::rgb;
     const auto sequence = compile_sequence(SequenceConfig{}, stage);
     ASSERT_TRUE(sequence.ok());
-    const StageNeeds needs = needs_of(stage, *sequence, 1, 0);
+    const StageNeeds needs = needs_of(stage, *sequence, 1, 0, {1, 1});
     EXPECT_EQ(needs.cameras[0].link_frame_bytes, 640u * 480);
     EXPECT_EQ(needs.cameras[1].link_frame_bytes, 640u * 480 * 3);
     EXPECT_EQ(needs.cameras[1].frame_bytes, 3 * needs.cameras[0].frame_bytes);
     EXPECT_NEAR(needs.cameras[1].frames_per_s, 2160, 1);
     stage.cameras[1].trigger = 3;  // a line that this program, made for another stage, does not fire
-    EXPECT_EQ(needs_of(stage, *sequence, 1, 0).cameras[1].frames_per_s, 0);
+    EXPECT_EQ(needs_of(stage, *sequence, 1, 0, {1, 1}).cameras[1].frames_per_s, 0);
 }
 
 TEST_F(DisksOfAStage, are_skipped_without_folders_and_in_a_hurry) {
-    for (const Finding& finding : check_disks(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.found;
+    for (const Finding& finding : check_disks(up)) EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.found;
     up.takes_folder = disk_;
     up.is_quick = true;
     for (const Finding& finding : check_disks(up))
         if (finding.check != Check::disk_space) {
-            EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.found;
+            EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.found;
         }
 }
 
@@ -93,11 +91,11 @@ TEST_F(DisksOfAStage, fail_without_room_or_folder) {
             if (finding.check == Check::disk_space && finding.subject == up.takes_folder) return finding;
         return Finding{};
     };
-    EXPECT_EQ(of_takes().verdict, Verdict::ok);
+    EXPECT_EQ(of_takes().verdict, CheckVerdict::ok);
     up.needs.take_s = 1e9;
-    EXPECT_EQ(of_takes().verdict, Verdict::fail);
+    EXPECT_EQ(of_takes().verdict, CheckVerdict::fail);
     up.takes_folder = "/no/such/folder";
-    EXPECT_EQ(of_takes().verdict, Verdict::fail);
+    EXPECT_EQ(of_takes().verdict, CheckVerdict::fail);
     EXPECT_NE(of_takes().commands[0].find("/no/such/folder"), std::string::npos);
 }
 
@@ -107,7 +105,7 @@ TEST_F(DisksOfAStage, in_memory_are_no_disks) {
     up.spill_folder = "/dev/shm";
     for (const Finding& finding : check_disks(up)) {
         if (finding.subject != "/dev/shm") continue;
-        EXPECT_EQ(finding.verdict, finding.check == Check::disk_space ? Verdict::warn : Verdict::skipped)
+        EXPECT_EQ(finding.verdict, finding.check == Check::disk_space ? CheckVerdict::warn : CheckVerdict::skipped)
             << finding.found;
         EXPECT_NE(finding.found.find("memory"), std::string::npos);
     }
@@ -118,14 +116,14 @@ TEST_F(DisksOfAStage, are_judged_by_what_the_stage_asks_for) {
     up.needs.targets_per_s = 0.001;
     up.takes_folder = up.spill_folder = disk_;
     const auto verdict_of = [this](Check check) {
-        Verdict worst = Verdict::skipped;
+        CheckVerdict worst = CheckVerdict::skipped;
         for (const Finding& finding : check_disks(up))
-            if (finding.check == check && finding.verdict != Verdict::skipped) worst = finding.verdict;
+            if (finding.check == check && finding.verdict != CheckVerdict::skipped) worst = finding.verdict;
         return worst;
     };
-    EXPECT_EQ(verdict_of(Check::disk_write), Verdict::ok);
+    EXPECT_EQ(verdict_of(Check::disk_write), CheckVerdict::ok);
     up.needs.cameras[0].frames_per_s = 1e7;  // 20 TB/s
-    EXPECT_EQ(verdict_of(Check::disk_write), Verdict::warn);
+    EXPECT_EQ(verdict_of(Check::disk_write), CheckVerdict::warn);
     for (const Finding& finding : check_disks(up))
         if (finding.check == Check::disk_write) {
             EXPECT_NE(finding.found.find(": a take of 10 s takes "), std::string::npos) << finding.found;
@@ -190,8 +188,8 @@ TEST_F(DisksOfAStage, that_cannot_be_written_fail_with_what_to_do) {
         up.takes_folder = disk_;
         int code = 1;
         for (const Finding& finding : check_disks(up))
-            if (finding.check == Check::disk_write && finding.verdict == Verdict::fail && !finding.commands.empty() &&
-                finding.found.find("cannot write a file") != std::string::npos)
+            if (finding.check == Check::disk_write && finding.verdict == CheckVerdict::fail &&
+                !finding.commands.empty() && finding.found.find("cannot write a file") != std::string::npos)
                 code = 0;
         _exit(code);
     }

@@ -25,93 +25,93 @@ TEST_F(MachineOfAShoot, that_shows_nothing_is_not_well) {
     std::filesystem::remove(machine.place("/proc/self/status"));
     machine.clock.reset();
     for (const auto family : {check_processor, check_memory, check_clock})
-        for (const Finding& finding : family(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.id();
+        for (const Finding& finding : family(up)) EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.id();
 }
 
 TEST_F(MachineOfAShoot, has_every_core_at_full_clock) {
     put_governor(0, "performance");
     put_governor(1, "performance");
-    expect(check_processor(up), Check::governor, Verdict::ok, "performance on 2 cores");
+    expect(check_processor(up), Check::governor, CheckVerdict::ok, "performance on 2 cores");
     put_governor(1, "schedutil");
     const Findings findings = check_processor(up);
-    expect(findings, Check::governor, Verdict::warn, "schedutil on 1 core");
+    expect(findings, Check::governor, CheckVerdict::warn, "schedutil on 1 core");
     EXPECT_NE(only(findings, Check::governor).commands[0].find("/etc/tmpfiles.d/"), std::string::npos);
 }
 
 TEST_F(MachineOfAShoot, has_a_core_for_each_reader_and_one_more) {
     give_camera("fake:100", 1);
     give_camera("fake:101", 1);
-    expect(check_processor(up), Check::cores, Verdict::ok, "4 cores");
+    expect(check_processor(up), Check::cores, CheckVerdict::ok, "4 cores");
     for (const auto& [list, count] : std::map<std::string, std::string>{{"1", "1"}, {"0,2", "2"}}) {
         cores = list;
         be_user("1000", "1000", 0);
-        expect(check_processor(up), Check::cores, Verdict::warn, count + " core");
+        expect(check_processor(up), Check::cores, CheckVerdict::warn, count + " core");
     }
     cores = "0-1,3";
     be_user("1000", "1000", 0);
-    expect(check_processor(up), Check::cores, Verdict::ok, "3 cores");
+    expect(check_processor(up), Check::cores, CheckVerdict::ok, "3 cores");
 }
 
 TEST_F(MachineOfAShoot, may_have_enough_files_open) {
     give_camera("fake:100", 1);
     put_limit("Max open files", "320");
-    expect(check_processor(up), Check::open_files, Verdict::ok, "320 files");
+    expect(check_processor(up), Check::open_files, CheckVerdict::ok, "320 files");
     put_limit("Max open files", "319");
-    expect(check_processor(up), Check::open_files, Verdict::fail, "319 files");
+    expect(check_processor(up), Check::open_files, CheckVerdict::fail, "319 files");
     put_limit("Max open files", "unlimited");
-    expect(check_processor(up), Check::open_files, Verdict::ok, "no limit");
+    expect(check_processor(up), Check::open_files, CheckVerdict::ok, "no limit");
 }
 
 // 2 MB a frame, 10 frames/s: 8 MB in four cycles of 0.1 s, 200 MB in 10 s.
 TEST_F(MachineOfAShoot, has_memory_for_the_frames_that_wait) {
     give_camera("fake:10", 10);
     put_memory(7'812, 0, 0);
-    expect(check_memory(up), Check::memory_free, Verdict::fail, "8 MB free");
+    expect(check_memory(up), Check::memory_free, CheckVerdict::fail, "8 MB free");
     put_memory(7'813, 0, 0);
-    expect(check_memory(up), Check::memory_free, Verdict::warn, "0.4 s of frames");
+    expect(check_memory(up), Check::memory_free, CheckVerdict::warn, "0.4 s of frames");
     put_memory(195'313, 0, 0);
-    expect(check_memory(up), Check::memory_free, Verdict::ok, "200 MB free");
+    expect(check_memory(up), Check::memory_free, CheckVerdict::ok, "200 MB free");
 }
 
 TEST_F(MachineOfAShoot, locks_what_could_be_swapped_out) {
     give_camera("fake:10", 10);
     put_memory(1'000'000, 1'000'000, 1'000'000);
     put_limit("Max locked memory", "7999999");
-    expect(check_memory(up), Check::memory_lock, Verdict::warn);
+    expect(check_memory(up), Check::memory_lock, CheckVerdict::warn);
     be_user("1000", "1000", uint64_t(1) << 14);
-    expect(check_memory(up), Check::memory_lock, Verdict::ok, "CAP_IPC_LOCK");
+    expect(check_memory(up), Check::memory_lock, CheckVerdict::ok, "CAP_IPC_LOCK");
     be_user("1000", "1000", 0);
     put_memory(1'000'000, 0, 0);
-    expect(check_memory(up), Check::memory_lock, Verdict::ok, "no swap");
+    expect(check_memory(up), Check::memory_lock, CheckVerdict::ok, "no swap");
     put_memory(1'000'000, 1'000'000, 1'000'000);
     put_limit("Max locked memory", "8000000");
-    expect(check_memory(up), Check::memory_lock, Verdict::ok);
+    expect(check_memory(up), Check::memory_lock, CheckVerdict::ok);
 }
 
 TEST_F(MachineOfAShoot, has_nothing_swapped_out) {
     put_memory(1'000'000, 2'000'000, 2'000'000);
-    expect(check_memory(up), Check::memory_swap, Verdict::ok);
+    expect(check_memory(up), Check::memory_swap, CheckVerdict::ok);
     put_memory(1'000'000, 2'000'000, 1'999'999);
-    expect(check_memory(up), Check::memory_swap, Verdict::warn, "in use");
+    expect(check_memory(up), Check::memory_swap, CheckVerdict::warn, "in use");
 }
 
 TEST_F(MachineOfAShoot, reads_its_clock_in_the_processor) {
     const std::string file = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
-    for (const auto& [source, verdict] : std::map<std::string, Verdict>{{"tsc", Verdict::ok},
-                                                                        {"kvm-clock", Verdict::ok},
-                                                                        {"arch_sys_counter", Verdict::ok},
-                                                                        {"hpet", Verdict::warn},
-                                                                        {"acpi_pm", Verdict::warn},
-                                                                        {"jiffies", Verdict::warn}}) {
+    for (const auto& [source, verdict] : std::map<std::string, CheckVerdict>{{"tsc", CheckVerdict::ok},
+                                                                             {"kvm-clock", CheckVerdict::ok},
+                                                                             {"arch_sys_counter", CheckVerdict::ok},
+                                                                             {"hpet", CheckVerdict::warn},
+                                                                             {"acpi_pm", CheckVerdict::warn},
+                                                                             {"jiffies", CheckVerdict::warn}}) {
         put(file, source + "\n");
         expect(check_clock(up), Check::clock_source, verdict, source);
     }
 }
 
 TEST_F(MachineOfAShoot, has_the_right_time) {
-    expect(check_clock(up), Check::clock_synchronised, Verdict::ok, "0.02 s");
+    expect(check_clock(up), Check::clock_synchronised, CheckVerdict::ok, "0.02 s");
     machine.clock = WallClock{false, 16};
-    expect(check_clock(up), Check::clock_synchronised, Verdict::warn);
+    expect(check_clock(up), Check::clock_synchronised, CheckVerdict::warn);
 }
 
 std::string output_of(const std::string& command) {
@@ -163,11 +163,11 @@ TEST(ThisMachine, has_the_clock_that_timedatectl_sees) {
 }
 
 TEST(FindingsTogether, give_the_exit_code_of_the_worst) {
-    const auto with = [](Verdict verdict) { return Finding{Check::mtu, "", verdict, "", "", {}}; };
+    const auto with = [](CheckVerdict verdict) { return Finding{Check::mtu, "", verdict, "", "", {}}; };
     EXPECT_EQ(exit_code_of({}), 0);
-    EXPECT_EQ(exit_code_of({with(Verdict::ok), with(Verdict::skipped)}), 0);
-    EXPECT_EQ(exit_code_of({with(Verdict::warn), with(Verdict::ok)}), 2);
-    EXPECT_EQ(exit_code_of({with(Verdict::warn), with(Verdict::fail)}), 1);
+    EXPECT_EQ(exit_code_of({with(CheckVerdict::ok), with(CheckVerdict::skipped)}), 0);
+    EXPECT_EQ(exit_code_of({with(CheckVerdict::warn), with(CheckVerdict::ok)}), 2);
+    EXPECT_EQ(exit_code_of({with(CheckVerdict::warn), with(CheckVerdict::fail)}), 1);
 }
 
 TEST(FiguresOfFindings, are_decimal_with_three_digits) {

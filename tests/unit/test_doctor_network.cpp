@@ -38,13 +38,13 @@ TEST_F(GigeNetwork, is_well_with_room_jumbo_frames_and_no_filter) {
     give_camera("aravis:192.168.7.2", 53);
     const Findings findings = check_network(up);
     for (const Check check : {Check::rmem_max, Check::rmem_default, Check::mtu, Check::rp_filter})
-        expect(findings, check, Verdict::ok);
-    expect(findings, Check::packet_socket, Verdict::warn, "no CAP_NET_RAW");
+        expect(findings, check, CheckVerdict::ok);
+    expect(findings, Check::packet_socket, CheckVerdict::warn, "no CAP_NET_RAW");
 }
 
 TEST_F(GigeNetwork, is_not_looked_at_without_a_camera_on_it) {
     give_camera("v4l2:0", 53);
-    for (const Finding& finding : check_network(up)) EXPECT_EQ(finding.verdict, Verdict::skipped) << finding.id();
+    for (const Finding& finding : check_network(up)) EXPECT_EQ(finding.verdict, CheckVerdict::skipped) << finding.id();
 }
 
 // 53 MB/s times 0.1 s are 5.3 MB.
@@ -53,89 +53,89 @@ TEST_F(GigeNetwork, needs_a_socket_for_a_tenth_of_a_second) {
     put("/proc/sys/net/core/rmem_max", "5299999\n");
     put("/proc/sys/net/core/rmem_default", "5300000\n");
     const Findings findings = check_network(up);
-    expect(findings, Check::rmem_max, Verdict::fail, "5299999 bytes");
-    expect(findings, Check::rmem_default, Verdict::ok, "5300000 bytes");
+    expect(findings, Check::rmem_max, CheckVerdict::fail, "5299999 bytes");
+    expect(findings, Check::rmem_default, CheckVerdict::ok, "5300000 bytes");
     EXPECT_NE(only(findings, Check::rmem_max).needed.find("5300000 bytes"), std::string::npos);
     EXPECT_NE(only(findings, Check::rmem_max).commands[0].find("net.core.rmem_max = 33554432"), std::string::npos);
 }
 
 TEST_F(GigeNetwork, needs_no_larger_socket_than_the_driver_asks_for) {
     give_camera("aravis:192.168.7.2", 1000);
-    expect(check_network(up), Check::rmem_max, Verdict::ok);
+    expect(check_network(up), Check::rmem_max, CheckVerdict::ok);
     put("/proc/sys/net/core/rmem_max", "33554431\n");
-    expect(check_network(up), Check::rmem_max, Verdict::fail);
+    expect(check_network(up), Check::rmem_max, CheckVerdict::fail);
 }
 
 TEST_F(GigeNetwork, that_the_kernel_does_not_show_is_not_well) {
     give_camera("aravis:192.168.7.2", 53);
     std::filesystem::remove(machine.place("/proc/sys/net/core/rmem_max"));
     std::filesystem::remove(machine.place("/sys/class/net/eth1/mtu"));
-    expect(check_network(up), Check::rmem_max, Verdict::skipped);
-    expect(check_network(up), Check::mtu, Verdict::skipped, "eth1");
+    expect(check_network(up), Check::rmem_max, CheckVerdict::skipped);
+    expect(check_network(up), Check::mtu, CheckVerdict::skipped, "eth1");
 }
 
 TEST_F(GigeNetwork, with_small_packets_is_warned_of_with_a_setting_that_lasts) {
     give_camera("aravis:192.168.7.2", 53);
     put_port("eth1", 1500);
     const Findings findings = check_network(up);
-    expect(findings, Check::mtu, Verdict::warn, "1500 bytes on eth1");
+    expect(findings, Check::mtu, CheckVerdict::warn, "1500 bytes on eth1");
     EXPECT_NE(only(findings, Check::mtu).commands[0].find("MACAddress=02:00:00:00:00:01\\n[Link]\\nMTUBytes=9000"),
               std::string::npos);
 }
 
 TEST_F(GigeNetwork, of_a_camera_that_is_found_by_its_serial_number_is_that_of_its_address) {
     give_camera("aravis:SN7", 53, {{"id", "maker", "model", "SN7", "192.168.7.9", "GigEVision"}});
-    expect(check_network(up), Check::mtu, Verdict::ok, "eth1");
+    expect(check_network(up), Check::mtu, CheckVerdict::ok, "eth1");
 }
 
 TEST_F(GigeNetwork, does_not_matter_to_a_usb3_camera) {
     give_camera("aravis:SN8", 53, {{"id", "maker", "model", "SN8", "", "USB3Vision"}});
-    expect(check_network(up), Check::rmem_max, Verdict::skipped);
+    expect(check_network(up), Check::rmem_max, CheckVerdict::skipped);
 }
 
 TEST_F(GigeNetwork, of_a_camera_that_is_not_found_has_no_interface_yet_needs_a_socket) {
     give_camera("aravis:SN7", 53);
     put("/proc/sys/net/core/rmem_max", "212992\n");
     const Findings findings = check_network(up);
-    expect(findings, Check::mtu, Verdict::skipped, "'aravis:SN7' is not found");
-    expect(findings, Check::rmem_max, Verdict::fail);
+    expect(findings, Check::mtu, CheckVerdict::skipped, "'aravis:SN7' is not found");
+    expect(findings, Check::rmem_max, CheckVerdict::fail);
 }
 
 TEST_F(GigeNetwork, may_be_strict_where_the_camera_is_in_its_own_network) {
     give_camera("aravis:192.168.7.2", 53);
     set_filter("eth1", 1);
-    expect(check_network(up), Check::rp_filter, Verdict::ok, "1 on eth1");
+    expect(check_network(up), Check::rp_filter, CheckVerdict::ok, "1 on eth1");
 }
 
 TEST_F(GigeNetwork, may_not_be_strict_where_the_camera_is_behind_a_router) {
     give_camera("aravis:10.0.0.2", 53);
     put_port("eth0", 9000);
     set_filter("all", 1);  // the higher of the two counts
-    expect(check_network(up), Check::rp_filter, Verdict::warn, "1 on eth0");
+    expect(check_network(up), Check::rp_filter, CheckVerdict::warn, "1 on eth0");
     set_filter("eth0", 2);
-    expect(check_network(up), Check::rp_filter, Verdict::ok, "2 on eth0");
+    expect(check_network(up), Check::rp_filter, CheckVerdict::ok, "2 on eth0");
 }
 
 TEST_F(GigeNetwork, that_is_strict_may_be_why_a_camera_is_not_found) {
     give_camera("aravis:SN7", 53);
-    expect(check_network(up), Check::rp_filter, Verdict::skipped);
+    expect(check_network(up), Check::rp_filter, CheckVerdict::skipped);
     set_filter("eth1", 1);
-    expect(check_network(up), Check::rp_filter, Verdict::warn, "strict on eth1");
+    expect(check_network(up), Check::rp_filter, CheckVerdict::warn, "strict on eth1");
 }
 
 TEST_F(GigeNetwork, has_a_packet_socket_for_who_has_the_capability) {
     give_camera("aravis:192.168.7.2", 53);
     be_user("1000", "1000", uint64_t(1) << 13);
-    expect(check_network(up), Check::packet_socket, Verdict::ok);
+    expect(check_network(up), Check::packet_socket, CheckVerdict::ok);
     be_user("1000", "1000", ~(uint64_t(1) << 13));
-    expect(check_network(up), Check::packet_socket, Verdict::warn);
+    expect(check_network(up), Check::packet_socket, CheckVerdict::warn);
 }
 
 TEST_F(GigeNetwork, is_the_loopback_for_a_camera_of_this_machine) {
     give_camera("aravis:127.0.0.1", 53);
     put_port("lo", 65536);
-    expect(check_network(up), Check::mtu, Verdict::ok, "65536 bytes on lo");
-    expect(check_network(up), Check::packet_socket, Verdict::skipped);
+    expect(check_network(up), Check::mtu, CheckVerdict::ok, "65536 bytes on lo");
+    expect(check_network(up), Check::packet_socket, CheckVerdict::skipped);
 }
 
 TEST_F(GigeNetwork, is_chosen_by_the_longest_prefix) {

@@ -49,7 +49,9 @@ int record_take_onto(const std::string& path, uint32_t targets, bool disk_fills_
     }
     TargetWriter::Report report;
     {
-        TargetWriter writer(*archive);
+        StageBeats beats;
+        OutputMonitor monitor(beats, 0, 1, 57'870);
+        TargetWriter writer(*archive, monitor);
         for (uint32_t index = 0; index < targets; ++index) {
             TargetOutcome outcome{0, index, nullptr, "", {{"cycle", index}, {"padding", std::string(3000, 'p')}}};
             outcome.target =
@@ -90,12 +92,16 @@ TEST_F(SmallDisks, a_disk_that_another_program_fills_to_the_last_byte_still_take
 TEST_F(SmallDisks, runs_of_targets_that_were_never_recorded_are_one_line_and_one_entry) {
     auto archive = ArchiveWriter::create(path, take_info(1));
     ASSERT_TRUE(archive->expect_targets(0, 1'000'000).ok());
-    TargetWriter writer(*archive);
+    StageBeats beats;
+    OutputMonitor monitor(beats, 0, 1, 57'870);
+    TargetWriter writer(*archive, monitor);
     writer.add(TargetOutcome{0, 0, std::make_unique<Target>(numbered_target(1, 8, 8, Cfa::none, 0)), "", {}});
     writer.add(LostTargets{0, 1, 999'999, "no frame of it was recorded: the take was stopped"});
     const auto report = writer.finish();
     ASSERT_TRUE(archive->finish().ok());
     EXPECT_EQ(report.missing, 999'999);
+    EXPECT_EQ(monitor.progress().targets_written, 1u);
+    EXPECT_EQ(monitor.progress().targets_missing, 999'999u);
     EXPECT_LT(std::filesystem::file_size(path + "/journal.jsonl"), 2000u);
     const auto reader = ArchiveReader::open(path);
     ASSERT_EQ(reader->targets().size(), 2u);
