@@ -8,6 +8,7 @@
 
 #include "daemon/metrics.hpp"
 #include "daemon/preview.hpp"
+#include "image/base64.hpp"
 #include "image/json_object.hpp"
 
 namespace ols {
@@ -41,7 +42,8 @@ TakeRequest take_request(JsonObject& params) {
     if (!request.quality.empty() && std::ranges::find(names, request.quality) == names.end())
         params.reject("quality", "is none of none, preview, standard and final");
     if (!request.slate.empty())
-        if (const Status fits = check_slate(request.slate); !fits) params.reject("slate", ": " + fits.error().message);
+        if (const Status fits = check_slate(request.slate); !fits)
+            params.reject("slate", "is none: " + fits.error().message);
     return request;
 }
 
@@ -52,18 +54,6 @@ CardOptions card_options(JsonObject& params) {
     if (params.has("exposure_us")) card.exposure_us = params.number("exposure_us", 0.1, 400);
     if (params.has("cycles")) card.cycles = int(std::max<uint64_t>(params.count("cycles", 10'000), 1));
     return card;
-}
-
-std::string base64_of(const std::vector<uint8_t>& bytes) {
-    static constexpr char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string text;
-    for (size_t i = 0; i < bytes.size(); i += 3) {
-        const size_t count = std::min<size_t>(3, bytes.size() - i);
-        uint32_t group = 0;
-        for (size_t k = 0; k < 3; ++k) group = group << 8 | (k < count ? bytes[i + k] : 0);
-        for (size_t k = 0; k < 4; ++k) text += k <= count ? letters[group >> (18 - 6 * k) & 63] : '=';
-    }
-    return text;
 }
 
 // Of one take at a time, and the developing of a take that runs goes on beside it: it takes one processor.
@@ -175,11 +165,11 @@ RpcOutcome Api::call(const std::string& name, const json& given, const std::stri
         return {nullptr,
                 RpcError{RpcError::wrong_state, fmt::format("{} is for the states {}, and the stage is in state {}",
                                                             name, state_words(method->allowed), state_name(state))}};
-    JsonObject params(given, name);
-    return call_now(name, params, given, caller);
+    JsonObject params(given, "the call of " + name, "is wrong");
+    return call_now(name, params, caller);
 }
 
-RpcOutcome Api::call_now(const std::string& name, JsonObject& params, const json&, const std::string& caller) {
+RpcOutcome Api::call_now(const std::string& name, JsonObject& params, const std::string& caller) {
     // Parameters are read and all of them known before anything is done.
     const auto checked = [&](auto work) -> RpcOutcome {
         if (const Status known = params.finish(); !known) return invalid(known.error().message);

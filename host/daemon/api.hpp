@@ -27,8 +27,7 @@ class Api {
     std::string metrics() const;
 
   private:
-    RpcOutcome call_now(const std::string& method, class JsonObject& params, const nlohmann::json& given,
-                        const std::string& caller);
+    RpcOutcome call_now(const std::string& method, class JsonObject& params, const std::string& caller);
 
     Conductor& conductor_;
     EventLog& events_;

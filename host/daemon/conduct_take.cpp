@@ -176,7 +176,8 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
                            const nlohmann::json& watched) {
     const auto take = snapshot().take;
     if (!report) {
-        const std::string why = stop_.wanted ? report.error().message + ": " + stop_.why() : report.error().message;
+        std::string why = report.error().message;
+        if (stop_.wanted && why.find(stop_.why()) == std::string::npos) why += ": " + stop_.why();
         events_.add(EventKind::take_failed, why, {{"take", take->name}});
         devices_.reset();  // as they are is not known: they are opened anew, and looked at
         next_look_ = {};
@@ -185,6 +186,7 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
     nlohmann::json account = take_json(*report, archives);
     account.update(watched);
     account["take"] = take->name;
+    account["slots_missing_total"] = report->record.missing().total();
     {
         const std::lock_guard lock(mutex_);
         now_.last_take = account;

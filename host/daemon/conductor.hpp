@@ -59,7 +59,7 @@ struct Snapshot {
 // Functions may be called from any thread; one thing is done at a time, and what comes meanwhile is refused with what it is.
 class Conductor {
   public:
-    // `stage` was read from the file `config_path`.
+    // `stage` was read from the file `config_path`. Returns when the devices have been looked at.
     Conductor(std::string config_path, StageConfig stage, EventLog& events);
     ~Conductor();
 

@@ -82,9 +82,10 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
     plan.sequence_name = sequence_name;
     plan.choices = choices_of(request, setup);
     const double seconds = request.seconds.value_or(setup.seconds);
-    // Targets of a performance need half a cycle before and after them.
-    const double cycles =
-        std::ceil(seconds * double(tick_hz) / double(one_cycle->cycle_ticks()) - 1e-9) + (plan.choices.fps > 0 ? 1 : 0);
+    // Slots are whole ticks, so that twelve cycles may last a bit less than a second: that asks for no thirteenth. Targets of a
+    // performance need half a cycle before and after them.
+    const double played = seconds * double(tick_hz) / double(one_cycle->cycle_ticks());
+    const double cycles = std::ceil(played - 0.01) + (plan.choices.fps > 0 ? 1 : 0);
     if (!(cycles >= 1 && cycles <= cycles_max))
         return fail(fmt::format("a take lasts from one cycle to {:.0f} s, and not {} s",
                                 cycles_max * double(one_cycle->cycle_ticks()) / double(tick_hz), seconds));

@@ -25,6 +25,9 @@ struct LinkOptions {
     double patience_s = Patience::exchange_ms / 1e3;
 
     void add_to(CLI::App& verb, bool with_camera);
+
+    // Neither stage nor devices: what a verb does is the daemon's to do.
+    bool names_nothing() const { return stage_path.empty() && board.empty() && cameras.empty(); }
 };
 
 struct StageSession {
