@@ -143,7 +143,7 @@ bool Machine::is_member(const std::string& user, const std::string& group) const
 
 std::string Machine::user() const {
     const auto ids = words_in(process_status("Uid").value_or(""));
-    const std::string id = ids.size() == 4 ? ids[1] : "";
+    std::string id = ids.size() == 4 ? ids[1] : "";
     for (const std::string& line : lines_in(read("/etc/passwd").value_or(""))) {
         const auto fields = split(line, ':');
         if (fields.size() >= 3 && fields[2] == id) return fields[0];
