@@ -17,6 +17,7 @@
 #include "daemon/events.hpp"
 #include "daemon/stage_devices.hpp"
 #include "daemon/states.hpp"
+#include "daemon/stuck_watch.hpp"
 #include "daemon/take_plan.hpp"
 #include "take/card.hpp"
 #include "take/stage_watch.hpp"
@@ -122,12 +123,11 @@ class Conductor {
         bool dark = false;
         uint64_t missing = 0;  // slots, that were told
         Clock::time_point next_progress, next_missing;
-        std::map<std::string, std::pair<uint64_t, Clock::time_point>> beats;
+        StuckWatch stages;
     };
     void tell_progress(const TakeProgress& progress, Clock::time_point now);
     void tell_dark(const BoardProgress& board);
     void watch_disk(const TakeProgress& progress);
-    std::string stuck_stage(const TakeProgress& progress, Clock::time_point now, std::chrono::seconds stuck_after);
 
     const std::string config_path_;
     EventLog& events_;

@@ -105,6 +105,10 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
                                         uint64_t(setup.reserve_mb) * 1'000'000);
     if (!forecast) return forecast.error();
     plan.forecast = *forecast;
+    if (!request.also.empty() && plan.targets.every == 0)
+        return fail("another quality is of a performance: give its targets a second, too, as --fps 24");
+    plan.forecast.bytes_needed *= 1 + request.also.size();
+    plan.forecast.seconds_that_fit /= double(1 + request.also.size());
     return plan;
 }
 

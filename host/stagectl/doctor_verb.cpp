@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "daemon/disk_forecast.hpp"
+#include "daemon/take_plan.hpp"
 #include "doctor/check_up.hpp"
 #include "program.hpp"
 #include "stagectl/doctor_table.hpp"
@@ -22,7 +23,7 @@ struct Options {
     LinkOptions links;
     SequenceOptions sequence;
     std::string takes, spill;
-    double take_s = 10, target_rate_hz = 0;
+    std::optional<double> take_s, target_rate_hz;
     bool list = false, json = false, quick = false;
 };
 
@@ -51,28 +52,49 @@ Result<std::vector<std::string>> sources_of(const Options& options, const StageC
 }
 
 // The sequence decides how often cameras fire.
-Result<StageNeeds> needs_of(const Options& options, const StageConfig& stage) {
+Result<Sequence> sequence_of(const Options& options, const StageConfig& stage) {
     SequenceOptions wanted = options.sequence;
-    if (wanted.path.empty() && wanted.basis.empty()) wanted.basis = SequenceConfig{}.basis;
-    const auto sequence = open_compiled(wanted, -1, stage);
+    const bool is_asked_for = !wanted.path.empty() || !wanted.basis.empty();
+    if (!is_asked_for && stage.daemon.is_there) {
+        const auto config = find_sequence(stage.daemon.sequence, stage.daemon);
+        if (!config.ok()) return config.error();
+        return compile_sequence(*config, stage);
+    }
+    if (!is_asked_for) wanted.basis = SequenceConfig{}.basis;
+    return open_compiled(wanted, -1, stage);
+}
+
+// What is not said is as the daemon's configuration says.
+void take_defaults(const DaemonSetup& daemon, Options& options) {
+    if (!daemon.is_there) return;
+    if (options.takes.empty()) options.takes = daemon.takes;
+    if (options.spill.empty()) options.spill = daemon.spill;
+    if (!options.take_s) options.take_s = daemon.seconds;
+    if (!options.target_rate_hz) options.target_rate_hz = daemon.fps;
+}
+
+Result<StageNeeds> needs_of(const Options& options, const StageConfig& stage) {
+    const auto sequence = sequence_of(options, stage);
     if (!sequence.ok()) return sequence.error();
     TakeTargets targets;
-    targets.every = options.target_rate_hz > 0 ? 1 : 0;  // of a performance, which has more beside its lamps
+    const double target_rate_hz = options.target_rate_hz.value_or(0);
+    targets.every = target_rate_hz > 0 ? 1 : 0;  // of a performance, which has more beside its lamps
     std::vector<uint64_t> target_bytes;
     if (sequence->is_capture())
         for (size_t camera = 0; camera < stage.cameras.size(); ++camera)
             target_bytes.push_back(target_bytes_max(*sequence, stage, camera, targets, false));
-    return needs_of(stage, *sequence, options.take_s, options.target_rate_hz, target_bytes);
+    return needs_of(stage, *sequence, options.take_s.value_or(10), target_rate_hz, target_bytes);
 }
 
 bool is_coloured() {
     return isatty(STDOUT_FILENO) && !std::getenv("NO_COLOR");
 }
 
-Result<int> run(const Options& options) {
+Result<int> run(Options options) {
     if (options.list) return list_checks(options.json);
     const auto stage = open_stage(options.links);
     if (!stage.ok()) return stage.error();
+    take_defaults(stage->daemon, options);
     const auto sources = sources_of(options, *stage);
     if (!sources.ok()) return sources.error();
     const auto needs = needs_of(options, *stage);
