@@ -40,6 +40,7 @@ nlohmann::json to_json(const TakeReport& report, const std::vector<PlannedArchiv
         if (const auto& clock = report.record.cameras[n].clock) json["cameras"][n]["clock"] = clock_record(*clock);
     json["host_clock"] = report.record.host_clock ? clock_record(*report.record.host_clock) : nlohmann::json();
     json["seconds"]["total"] = report.seconds_total;
+    json["memory"] = {{"frames_spilled", report.memory.frames_spilled}, {"problem", report.memory.problem}};
     for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));
     return json;
 }
@@ -111,6 +112,7 @@ void print_report(const TakeReport& report, bool is_estimate, const std::vector<
     if (!options.json)
         fmt::print("{} of {} slots missing; {:.1f} s\n", missing, record.slots_total * record.cameras.size(),
                    report.seconds_total);
+    if (!report.memory.problem.empty()) fmt::print(stderr, "stagectl: {}\n", report.memory.problem);
     if (!record.board_end.empty())
         fmt::print(stderr, "stagectl: {} ({})\n", record.board_end.text, cause_words(record.board_end.cause));
     for (const CameraReport& camera : record.cameras)
@@ -142,6 +144,7 @@ Result<int> finish_take(const TakeReport& report, bool is_estimate, const std::v
     // The take is finished first, whatever became of its account.
     if (account)
         if (const Status told = account->finish(); !told.ok()) return told.error();
+    if (!report.memory.problem.empty()) return 1;
     int missing = 0;
     for (const OutputReport& output : report.outputs) {
         if (!output.write_error.empty()) return 1;
