@@ -102,7 +102,7 @@ bool may_have_threads_that_never_end() {
 int run_program(CLI::App& app, int argc, char** argv, const int& exit_code) {
     occupy_standard_descriptors();
     std::signal(SIGXFSZ, SIG_IGN);
-    app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), version), "say which version this is");
+    app.set_version_flag("--version", program_version(app.get_name()), "say which version this is");
     int code = 1;
     try {
         code = parse(app, argc, argv, exit_code);
@@ -112,6 +112,10 @@ int run_program(CLI::App& app, int argc, char** argv, const int& exit_code) {
     code = finish_printing(app, code);
     if (may_have_threads_that_never_end()) _exit(code);
     return code;
+}
+
+std::string program_version(const std::string& program) {
+    return fmt::format("{} {}", program, version);
 }
 
 void print_json(const nlohmann::json& json, int indent) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
 namespace CLI {
 class App;
@@ -16,6 +17,9 @@ namespace ols {
 // An exception that comes this far is printed with the verb and what it was given, and makes an exit code of 1. A word that is no
 // verb is an error with --help and --version, too.
 int run_program(CLI::App& app, int argc, char** argv, const int& exit_code);
+
+// "stagectl 0.1.0 (commit)", as --version says it.
+std::string program_version(const std::string& program);
 
 // Prints JSON and a new line to standard output, from any thread. Bytes that are not UTF-8 (names of files can have them) are
 // replaced. A failure shows at the end, in run_program().

@@ -5,8 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -15,6 +13,7 @@
 #include <optional>
 
 #include "device/socket_usb.hpp"
+#include "device/unix_listener.hpp"
 
 namespace ols {
 
@@ -23,21 +22,6 @@ namespace {
 constexpr size_t out_bytes_max = 16 * OLS_FRAME_BYTES_MAX;  // of one transfer
 constexpr size_t read_bytes = 64 << 10;
 constexpr std::chrono::seconds last_answer_kept{2};
-
-sockaddr_un address_of(const std::string& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::memcpy(address.sun_path, path.c_str(), path.size());
-    return address;
-}
-
-bool is_listened_at(const std::string& path) {
-    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const sockaddr_un address = address_of(path);
-    const bool connected = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-    ::close(fd);
-    return connected;
-}
 
 bool send_reply(int fd, const SocketUsbReply& reply, std::span<const uint8_t> payload = {}) {
     std::vector<uint8_t> bytes(sizeof reply + payload.size());
@@ -135,23 +119,9 @@ struct BoardRelay::Client {
 };
 
 Result<std::unique_ptr<BoardRelay>> BoardRelay::listen(const std::string& path) {
-    if (path.empty() || path.size() >= sizeof sockaddr_un::sun_path)
-        return fail("'" + path + "' is no path of a socket: at most 107 bytes; choose a shorter one");
-    struct stat there {};
-    if (::lstat(path.c_str(), &there) == 0) {
-        if (!S_ISSOCK(there.st_mode)) return fail("'" + path + "' exists and is not a socket: choose another path");
-        if (is_listened_at(path)) return fail("another program listens at '" + path + "': choose another path");
-        ::unlink(path.c_str());
-    }
-    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    const sockaddr_un address = address_of(path);
-    if (fd < 0 || ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::listen(fd, 4) != 0) {
-        const int error = errno;
-        if (fd >= 0) ::close(fd);
-        return fail(fmt::format("cannot listen at '{}' ({}): is there such a folder?", path, std::strerror(error)));
-    }
-    return std::unique_ptr<BoardRelay>(new BoardRelay(path, fd));
+    const auto listener = listen_at(path);
+    if (!listener.ok()) return listener.error();
+    return std::unique_ptr<BoardRelay>(new BoardRelay(path, *listener));
 }
 
 BoardRelay::BoardRelay(std::string path, int listener) : path_(std::move(path)), listener_(listener) {}

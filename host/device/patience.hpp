@@ -34,7 +34,10 @@ class Patience {
     using Clock = std::chrono::steady_clock;
 
     Clock::time_point end_after_stop() {
-        if (!stop_ || !*stop_) return Clock::time_point::max();
+        if (!stop_ || !*stop_) {
+            end_after_stop_.reset();  // of a device that outlives one stop
+            return Clock::time_point::max();
+        }
         if (!end_after_stop_) end_after_stop_ = Clock::now() + std::chrono::milliseconds(stop_ms);
         return *end_after_stop_;
     }

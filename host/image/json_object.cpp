@@ -86,7 +86,7 @@ Result<json> parse_json(std::string_view text, const std::string& source) {
 }
 
 struct JsonObject::Account {
-    std::string source, error;
+    std::string lead, error;  // what begins every error
     // Every object that was looked into, and the keys that were asked for.
     struct Visited {
         const json* object;
@@ -96,12 +96,12 @@ struct JsonObject::Account {
     std::vector<Visited> visited;
 
     void reject(const std::string& path, const std::string& what) {
-        if (error.empty()) error = fmt::format("{} is damaged: {} {}", source, path, what);
+        if (error.empty()) error = fmt::format("{}: {} {}", lead, path, what);
     }
 };
 
-JsonObject::JsonObject(const json& value, const std::string& source)
-    : JsonObject(&value, std::make_shared<Account>(Account{source, "", {}}), "") {}
+JsonObject::JsonObject(const json& value, const std::string& source, const std::string& verdict)
+    : JsonObject(&value, std::make_shared<Account>(Account{source + " " + verdict, "", {}}), "") {}
 
 JsonObject::JsonObject(const json* value, std::shared_ptr<Account> account, std::string prefix)
     : json_(value),
@@ -204,8 +204,7 @@ Status JsonObject::finish() const {
     for (const auto& [object, prefix, asked] : account_->visited)
         for (const auto& [key, value] : object->items())
             if (!asked->contains(key))
-                return fail(
-                    fmt::format("{} is damaged: {}{} is no key of this version", account_->source, prefix, shown(key)));
+                return fail(fmt::format("{}: {}{} is no key of this version", account_->lead, prefix, shown(key)));
     return Done{};
 }
 

@@ -32,8 +32,8 @@ std::string json_line(const nlohmann::json& json);
 // that is empty or 0, and the first thing that is wrong in the whole value is kept for finish().
 class JsonObject {
   public:
-    // `source` begins every error.
-    JsonObject(const nlohmann::json& json, const std::string& source);
+    // `source` and `verdict` begin every error.
+    JsonObject(const nlohmann::json& json, const std::string& source, const std::string& verdict = "is damaged");
 
     bool has(const std::string& key) const;
     std::string text(const std::string& key);

@@ -128,7 +128,7 @@ Result<std::shared_ptr<FrameRoom>> room_of(const RecordedCamera& recorded, const
 
 }  // namespace
 
-Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
+Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
     if (board.info().tick_hz != tick_hz)
         return fail(
             fmt::format("the board's clock runs at {} Hz and not at {}: flash the firmware of this release: "
@@ -144,10 +144,18 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
                               uint32_t(sequence.config.cycles), sequence.config.playback);
         !s.ok())
         return s;
-    if (Status s = board.arm(sequence.config.playback); !s.ok()) return s;
+    return board.arm(sequence.config.playback);
+}
+
+Status start_armed_board(Board& board) {
     Status started = board.start();
     if (!started.ok()) board.tell_to_stop();  // it may play without its answer having come
     return started;
+}
+
+Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
+    if (const Status armed = arm_board(board, sequence, stage); !armed.ok()) return armed;
+    return start_armed_board(board);
 }
 
 size_t frame_bytes(const CameraConfig& camera) {
@@ -159,7 +167,8 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
 }
 
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor) {
+                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor,
+                                 bool is_armed) {
     RecordMonitor own_monitor;
     if (!monitor) monitor = &own_monitor;
     for (const RecordedCamera& recorded : cameras)
@@ -173,7 +182,8 @@ Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>
         if (!takes.back().time_ns().ok()) return takes.back().time_ns().error();
     }
     if (stop.wanted) return fail("stopped before the take began");
-    if (const Status status = start_board(board, sequence, stage); !status.ok()) return status.error();
+    const Status status = is_armed ? start_armed_board(board) : start_board(board, sequence, stage);
+    if (!status.ok()) return status.error();
 
     for (size_t i = 0; i < cameras.size(); ++i) takes[i].begin(stage.cameras[cameras[i].index]);
     // With no camera left nobody would see what the board plays.

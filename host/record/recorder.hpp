@@ -76,18 +76,24 @@ size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
 // Of a frame's samples, 16 bits each.
 size_t frame_bytes(const CameraConfig& camera);
 
-// Loads, arms and starts the sequence as its playback says; after that the board plays, or waits for an edge. The error is the
-// board's own, or says what a latched fault was.
+// Loads and arms the sequence as its playback says. The error is the board's own, or says what a latched fault was.
+Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage);
+
+// Starts what is armed; after that the board plays, or waits for an edge.
+Status start_armed_board(Board& board);
+
+// Both.
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage);
 
 // Sets the cameras up as the stage says and starts them, loads the sequence, arms and starts the board, and returns when every
 // trigger is decided for each camera. Each has its reader, its identification and its sink, in threads of its own: what one loses
 // the others do not. `stop` ends the take early, and so do the cameras when none of them is left: the board goes dark, what was
-// fired is still identified, the rest is missing.
-// `monitor`, which may be null, follows; it has seen no other recording.
+// fired is still identified, the rest is missing. A board `is_armed` by arm_board() with this sequence is only
+// started. `monitor`, which may be null, follows; it has seen no other recording.
 // Errors: a camera is not as the stage says or cannot be started; the board cannot be loaded or started. A board or camera that
 // fails later is no error here: what was proved stands, the rest is missing and says why.
 Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>& cameras, const Sequence& sequence,
-                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor = nullptr);
+                                 const StageConfig& stage, const StopRequest& stop, RecordMonitor* monitor = nullptr,
+                                 bool is_armed = false);
 
 }  // namespace ols

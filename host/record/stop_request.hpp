@@ -22,6 +22,13 @@ class StopRequest {
         if (!wanted.exchange(true)) why_ = why;
     }
 
+    // Nothing is wanted any more, before another take begins. Not while anybody heeds it.
+    void reset() {
+        const std::lock_guard lock(mutex_);
+        wanted = false;
+        why_.clear();
+    }
+
     // "" while nothing is wanted.
     std::string why() const {
         const std::lock_guard lock(mutex_);

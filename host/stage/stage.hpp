@@ -9,6 +9,7 @@
 #include "image/frame.hpp"
 #include "result.hpp"
 #include "stage/camera_setup.hpp"
+#include "stage/daemon_setup.hpp"
 #include "stage/gpio_setup.hpp"
 #include "stage/lamp_response.hpp"
 #include "stage/lamps.hpp"
@@ -48,6 +49,7 @@ struct StageConfig {
     std::vector<CameraConfig> cameras;
     GpioSetup gpio;
     TelemetrySetup telemetry;
+    DaemonSetup daemon;
     std::string calibration_dir = "";  // "" = none yet
 
     int lamp_count() const { return int(lamps.size() + matte_lamps_m.size()); }

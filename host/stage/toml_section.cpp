@@ -300,6 +300,12 @@ std::vector<TomlSection> TomlSection::sections(const std::string& key, size_t mo
     return found;
 }
 
+std::string TomlSection::place(const std::string& key) const {
+    const toml::node* node = as_table(table_).get(key);
+    const toml::source_region& where = node ? node->source() : as_table(table_).source();
+    return fmt::format("{}:{}: {}{}", file_->path, where.begin.line, prefix_, key);
+}
+
 std::string TomlSection::describe_unread(const std::string& name) const {
     const auto [table, key] = split_name(name);
     size_t nearest = std::max<size_t>(1, key.size() / 3) + 1;  // with more letters wrong it is another word

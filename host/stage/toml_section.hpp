@@ -64,6 +64,9 @@ class TomlSection {
     // Notes that a value is wrong in a way the read functions cannot know: `what` follows "file:line: key ".
     void reject(const std::string& key, const std::string& what);
 
+    // "stage.toml:12: daemon.quality": where a key stands, or its table where it is left out.
+    std::string place(const std::string& key) const;
+
     // The first error of the whole file: a wrong value, or a key that nobody has read. Of such a key it says which
     // tables have it, or which of its own table's is nearest, of those that were asked for, or else all of these.
     Status finish() const;

@@ -5,8 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "program.hpp"
+#include "stagectl/daemon_options.hpp"
 #include "stagectl/session.hpp"
-#include "stagectl/stage_watch.hpp"
+#include "stagectl/take_follower.hpp"
 #include "stagectl/verbs.hpp"
 #include "take/card.hpp"
 
@@ -15,13 +16,30 @@ namespace ols {
 namespace {
 
 struct Options {
+    DaemonLink daemon;
     LinkOptions links;
     CardOptions card;
     std::string output;
     bool json = false;
 };
 
+// Into the folder that the daemon's stage names.
+Result<int> calibrate_by_daemon(const Options& options) {
+    if (!options.output.empty())
+        return fail("-o: the daemon writes to the folder that its stage names: leave it out, or give --stage");
+    auto client = options.daemon.connect();
+    if (!client.ok()) return client.error();
+    nlohmann::json params = {
+        {"card", options.card.reflectance}, {"number", options.card.camera}, {"cycles", options.card.cycles}};
+    if (options.card.exposure_us > 0) params["exposure_us"] = options.card.exposure_us;
+    if (const auto begun = client->call("subscribe"); !begun.ok()) return begun.error();
+    if (const auto begun = client->call("calibrate", params); !begun.ok()) return begun.error();
+    return TakeFollower(*client, options.json).follow(stop_on_signal());
+}
+
 Result<int> run(const Options& options) {
+    if (options.links.names_nothing()) return calibrate_by_daemon(options);
+    if (options.output.empty()) return fail("-o FOLDER: say where the calibration goes");
     auto session = open_session(options.links, options.card.camera);
     if (!session.ok()) return session.error();
     StopRequest& stop = stop_on_signal();
@@ -31,7 +49,7 @@ Result<int> run(const Options& options) {
     const auto card =
         calibrate_with_card(*session->board, *session->cameras[0], session->stage, options.card, stop,
                             [](uint64_t decided, uint64_t total) { show_progress("calibrating", decided, total); });
-    watch->end_take();
+    say(watch->end_take());
     if (!card.ok()) return because_of(stop, card.error());
     if (Status s = write_calibration(options.output, options.card.camera, card->calibration, card->record); !s.ok())
         return s.error();
@@ -64,10 +82,12 @@ void add_calibrate_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Example: stagectl calibrate --stage examples/stage.toml --board socket:run/board.sock \\\n"
         "           --camera ring:run/cam0.ring --card 0.985 -o cal\n"
+        "         stagectl calibrate --card 0.985               the daemon's stage\n"
         "         stagectl calibrate --number 1 ... -o cal     the second camera's, into the same folder\n"
         "The card stands at the stage's centre and faces the camera. All lamps flash; nothing is written when a sample "
         "saturates,\nthe card is too dark or does not fill the view.");
     options->links.add_to(*verb, true);
+    options->daemon.add_to(*verb);
     verb->add_option("--card", options->card.reflectance, "reflectance of the card")->check(CLI::Range(0.01, 1.0));
     verb->add_option("--number", options->card.camera,
                      "which of the stage's cameras, from 0: each has the card face it in its turn, and its own part of "
@@ -76,7 +96,8 @@ void add_calibrate_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--exposure-us", options->card.exposure_us, "exposure; otherwise chosen from the camera's gain")
         ->check(CLI::Range(0.1, 400.0));
     verb->add_option("--cycles", options->card.cycles, "times 8 frames are averaged")->check(CLI::Range(1, 10'000));
-    verb->add_option("-o,--output", options->output, "folder to write")->required();
+    verb->add_option("-o,--output", options->output,
+                     "folder to write; the daemon writes to the one that its stage names");
     verb->add_flag("--json", options->json, "print as JSON");
     verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });
 }

@@ -12,7 +12,6 @@
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
-#include "stagectl/stage_watch.hpp"
 #include "stagectl/verbs.hpp"
 
 namespace ols {
@@ -82,12 +81,12 @@ Result<int> run(const Options& options) {
     }
     warn_of_flicker(*sequence);
     if (options.arm)
-        if (const Status armed = watch->wait_for_arm(); !armed.ok()) return armed.error();
+        if (const Status armed = wait_for_arm(*watch); !armed.ok()) return armed.error();
     if (const Status ready = watch->begin_take(); !ready.ok()) return ready.error();
     if (const Status status = start_board(*board, *sequence, *stage); !status.ok()) return status.error();
     Account account;
     follow(*board, *sequence, stop, relay.get(), options.json, account);
-    watch->end_take();
+    say(watch->end_take());
     if (account.end.is_lost)
         return fail(fmt::format("{}; after {} triggers the board's log could not be read", account.end.why.text,
                                 account.triggers));

@@ -5,7 +5,6 @@
 #include "image/outputs.hpp"
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/session.hpp"
-#include "stagectl/stage_watch.hpp"
 #include "stagectl/take_options.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -78,13 +77,13 @@ Result<int> run(const Options& options) {
     nlohmann::json watched;  // of the recording
     TakeSinks sinks = sinks_of(*planned, options.take, account, "recording");
     sinks.account = [&] {
-        watch->end_take();
+        say(watch->end_take());
         return watched = watch->account();
     };
     std::vector<Camera*> cameras;
     for (const auto& camera : session->cameras) cameras.push_back(camera.get());
     if (*waits)
-        if (const Status armed = watch->wait_for_arm(); !armed.ok()) return armed.error();
+        if (const Status armed = wait_for_arm(*watch); !armed.ok()) return armed.error();
     if (const Status ready = watch->begin_take(); !ready.ok()) return ready.error();
     const auto report = run_take(take, {*session->board, cameras}, sinks, stop);
     if (!report.ok()) return because_of(stop, report.error());

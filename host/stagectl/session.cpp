@@ -160,6 +160,15 @@ StopRequest& stop_on_signal() {
     return stop_request;
 }
 
+void say(const std::vector<std::string>& sentences) {
+    for (const std::string& sentence : sentences) fmt::print(stderr, "stagectl: {}\n", sentence);
+}
+
+Status wait_for_arm(StageWatch& watch) {
+    say({"waiting for the arm button"});
+    return watch.wait_for_arm();
+}
+
 Error because_of(const StopRequest& stop, const Error& error) {
     const std::string why = stop.why();
     return why.empty() ? error : fail(error.message + ": " + why);

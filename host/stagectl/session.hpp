@@ -13,6 +13,7 @@
 #include "device/camera.hpp"
 #include "record/stop_request.hpp"
 #include "stage/stage.hpp"
+#include "take/stage_watch.hpp"
 
 namespace ols {
 
@@ -24,6 +25,9 @@ struct LinkOptions {
     double patience_s = Patience::exchange_ms / 1e3;
 
     void add_to(CLI::App& verb, bool with_camera);
+
+    // Neither stage nor devices: what a verb does is the daemon's to do.
+    bool names_nothing() const { return stage_path.empty() && board.empty() && cameras.empty(); }
 };
 
 struct StageSession {
@@ -43,6 +47,12 @@ Result<StageSession> open_session(const LinkOptions& options, std::optional<uint
 // Is asked at the first SIGINT or SIGTERM, which also ends every wait for the board within Patience::stop_ms, as any other reason to
 // stop does; the second signal ends the program at once.
 StopRequest& stop_on_signal();
+
+// Prints sentences to standard error.
+void say(const std::vector<std::string>& sentences);
+
+// Says that it waits, and waits for the arm button.
+Status wait_for_arm(StageWatch& watch);
 
 // The error with the reason for a stop, where there was one.
 Error because_of(const StopRequest& stop, const Error& error);

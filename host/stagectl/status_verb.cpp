@@ -7,6 +7,7 @@
 #include "device/cycle_check.hpp"
 #include "device/log_reader.hpp"
 #include "program.hpp"
+#include "stagectl/daemon_status.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
 
@@ -15,8 +16,10 @@ namespace ols {
 namespace {
 
 struct Options {
+    DaemonLink daemon;
     LinkOptions links;
     bool clear_fault = false, cycles = false, json = false;
+    bool watch = false, metrics = false;
 };
 
 // A cycle that the board still keeps, and what holding its digest against its log gave.
@@ -63,6 +66,10 @@ nlohmann::json to_json(const std::vector<CheckedCycle>& cycles) {
 }
 
 Result<int> run(const Options& options) {
+    if (options.links.names_nothing() && !options.cycles)
+        return daemon_status(options.daemon, {options.clear_fault, options.watch, options.metrics, options.json});
+    if (options.watch || options.metrics)
+        return fail("--watch and --metrics are of the daemon: leave out --stage and --board");
     const auto stage = open_stage(options.links);
     if (!stage.ok()) return stage.error();
     auto board = open_board(options.links, *stage);
@@ -105,9 +112,15 @@ Result<int> run(const Options& options) {
 
 void add_status_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<Options>();
-    CLI::App* verb = app.add_subcommand("status", "ask the board how it is");
-    verb->footer("Example: stagectl status --board usb:");
+    CLI::App* verb = app.add_subcommand("status", "how the daemon's stage is, or with --board a board of one's own");
+    verb->footer(
+        "Example: stagectl status --watch\n"
+        "         stagectl status --board usb:\n"
+        "Exit codes: 0; 1 an error, or the stage is in a fault.");
     options->links.add_to(*verb, false);
+    options->daemon.add_to(*verb);
+    verb->add_flag("--watch", options->watch, "go on: what changes, until Ctrl-C");
+    verb->add_flag("--metrics", options->metrics, "the daemon's figures in Prometheus' text format");
     verb->add_flag("--clear-fault", options->clear_fault, "end a latched fault, once its cause is gone");
     verb->add_flag("--cycles", options->cycles, "check the cycles that the board still keeps against its trigger log");
     verb->add_flag("--json", options->json, "print as JSON");

@@ -6,6 +6,7 @@
 
 #include "program.hpp"
 #include "stage/playback.hpp"
+#include "stagectl/daemon_options.hpp"
 #include "stagectl/flicker_warning.hpp"
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
@@ -16,6 +17,7 @@ namespace ols {
 namespace {
 
 struct Options {
+    DaemonLink daemon;
     LinkOptions links;
     SequenceOptions sequence;
     int cycles = -1;
@@ -70,7 +72,23 @@ void print_result(const Options& options, const Sequence& sequence, const ols_sw
                has_followed ? "plays" : "will play", uint32_t(swap.after_cycles), swap.program);
 }
 
+// For the takes to come of the daemon's stage.
+Result<int> swap_by_daemon(const Options& options) {
+    if (options.sequence.path.empty() || options.cycles >= 0 || options.sequence.exposure_us > 0)
+        return fail(
+            "the daemon takes the name of a sequence, in its folder of sequences, or of a basis, and nothing else; a "
+            "board that "
+            "`stagectl play` plays is named by --board");
+    return call_and_print(options.daemon, "swap", {{"sequence", options.sequence.path}},
+                          [&](const nlohmann::json& swapped) {
+                              if (options.json) return print_json(swapped);
+                              fmt::print("takes are recorded with {}{}\n", swapped["sequence"].get<std::string>(),
+                                         swapped["armed"].get<bool>() ? ", with which the stage is armed" : "");
+                          });
+}
+
 Result<int> run(const Options& options) {
+    if (options.links.names_nothing()) return swap_by_daemon(options);
     const auto stage = open_stage(options.links);
     if (!stage.ok()) return stage.error();
     const auto sequence = open_compiled(options.sequence, options.cycles, *stage);
@@ -104,11 +122,14 @@ Result<int> run(const Options& options) {
 
 void add_swap_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<Options>();
-    CLI::App* verb =
-        app.add_subcommand("swap", "let another sequence follow what plays, at a cycle's end and without a gap");
+    CLI::App* verb = app.add_subcommand(
+        "swap", "another sequence for the daemon's takes, or for a board that plays: at a cycle's end");
     verb->footer(
-        "Example: stagectl swap examples/sequence_s159.toml --board socket:run/shared.sock\n"
-        "where the board is played by `stagectl play examples/sequence_single.toml --cycles 0 --share "
+        "Example: stagectl swap s159\n"
+        "         stagectl swap examples/sequence_s159.toml --board socket:run/shared.sock\n"
+        "The first is for the takes of the daemon, by the name of a sequence in its folder, or of a basis. The second "
+        "is for a "
+        "board, where the board is played by `stagectl play examples/sequence_single.toml --cycles 0 --share "
         "run/shared.sock`. "
         "Both sequences must have the same trigger polarities and lead.\n"
         "Ends when the sequence plays, and leaves it playing. Exit codes: 0 it plays (with --no-wait: it will); 1 an "
@@ -116,6 +137,7 @@ void add_swap_verb(CLI::App& app, int& exit_code) {
         "Flashing light can trigger seizures: see `stagectl sequence`.");
     options->sequence.add_to(*verb, "sequence");
     options->links.add_to(*verb, false);
+    options->daemon.add_to(*verb);
     verb->add_option("--cycles", options->cycles,
                      "how often to play the cycle, 0 until stopped; otherwise as the sequence says")
         ->check(CLI::Range(0, OLS_CYCLES_MAX));

@@ -4,35 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "develop/basis_record.hpp"
 #include "stagectl/session.hpp"
 
 namespace ols {
 
-Result<Calibration> open_calibration(const TakeOptions& options, const StageConfig& stage) {
-    const std::string folder = options.calibration.empty() ? stage.calibration_dir : options.calibration;
-    if (options.nominal) return nominal_calibration(stage);
-    if (folder.empty())
-        return fail(
-            "no calibration: run `stagectl calibrate` and give --calibration DIR (or calibration in the "
-            "stage), or give --nominal to take black level and gain as the stage states them");
-    return read_calibration(folder, stage);
-}
-
 namespace {
-
-TakeInfo take_info(const TakeOptions& options, const Sequence& sequence, const StageConfig& stage,
-                   const TakeTargets& targets) {
-    TakeInfo info = options.slate;
-    info.frame_rate_hz = targets.every > 0 ? tracking_rate_hz(sequence) / targets.every
-                                           : double(tick_hz) / double(sequence.cycle_ticks());
-    info.basis = sequence.basis.name;
-    info.value_unit = "reflectance";
-    info.lights = image_lights(sequence.basis, stage.lamps);
-    info.extra["basis"] = basis_record(sequence.basis);
-    info.sample_type = options.single_float ? SampleType::single_float : SampleType::half_float;
-    return info;
-}
 
 void add_to_account(LineFile& account, const Frame& frame) {
     account.add(fmt::format(R"({{"camera":{},"frame_id":{},"timestamp_ns":{},"cycle":{},"slot":{},"tick":{}}})",
@@ -40,87 +16,10 @@ void add_to_account(LineFile& account, const Frame& frame) {
                             frame.tick));
 }
 
-// Rates are whole ticks: 24 may be 24.0002, and where the cameras' rate was set for film on video, 23.976.
-void say_exact_rate(const TakeOptions& options, const Sequence& sequence, const TakeTargets& targets) {
-    if (targets.every > 0)
-        fmt::print(stderr,
-                   "stagectl: --fps {} is {:.7g} targets a second here, and so the archive says: {:.7g} tracking "
-                   "frames a second, {} to a target\n",
-                   options.fps, target_rate_hz(sequence, targets.every), tracking_rate_hz(sequence), targets.every);
-}
-
-// Wenger's flow holds for 1/24 s; longer cycles take frames from farther away.
-void warn_of_long_cycles(const Sequence& sequence, const TakeTargets& targets) {
-    const double reach_s = 0.5 * double(sequence.cycle_ticks()) / double(tick_hz);
-    if (targets.every > 0 && reach_s > 1.01 / 24)
-        fmt::print(stderr,
-                   "stagectl: a cycle lasts {:.1f} ms: frames up to {:.1f} ms from a target are aligned, more than "
-                   "1/24 s; fast "
-                   "motion may fail\n",
-                   2e3 * reach_s, 1e3 * reach_s);
-}
-
 }  // namespace
 
-TakeMasks masks_of(const TakeOptions& options) {
-    TakeMasks masks;
-    masks.fill_from_neighbours = options.fill == "neighbours";
-    masks.estimate = *estimate_named(options.estimate);  // one of estimate_names(), as the option was checked
-    return masks;
-}
-
-// A performance where --fps is given, one target a cycle else.
-Result<TakeTargets> targets_of(const TakeOptions& options, const Sequence& sequence) {
-    TakeTargets targets;
-    if (options.fps == 0) {
-        if (!options.quality.empty())
-            return fail("--quality is of a performance: give its targets a second, too, as --fps 24");
-        return targets;
-    }
-    if (options.fill == "neighbours")
-        return fail(
-            "--fill neighbours is for subjects that hold still; with --fps, lost slots come from the next cycle "
-            "anyway");
-    const auto every = tracking_frames_a_target(sequence, options.fps);
-    if (!every.ok()) return every.error();
-    auto quality = motion_quality(options.quality.empty() ? "standard" : options.quality);
-    if (!quality.ok()) return quality.error();
-    if (target_numbers(sequence, *every).empty())
-        return fail(fmt::format(
-            "{} {} of the basis hold no target: half a cycle is needed before and after one; give --cycles {}",
-            sequence.config.cycles, sequence.config.cycles == 1 ? "cycle" : "cycles", sequence.config.cycles + 1));
-    targets.every = *every;
-    targets.quality = std::move(*quality);
-    return targets;
-}
-
 void say_targets(const TakeOptions& options, const Sequence& sequence, const TakeTargets& targets) {
-    say_exact_rate(options, sequence, targets);
-    warn_of_long_cycles(sequence, targets);
-}
-
-// The archive of -o, and those of --also, all made beside.
-Result<std::vector<PlannedArchive>> plan_archives(const TakeOptions& options, const Sequence& sequence,
-                                                  const StageConfig& stage, const TakeTargets& targets) {
-    std::vector<PlannedArchive> planned;
-    const auto add = [&](const std::string& path, const TakeTargets& chosen) -> Status {
-        auto archive =
-            ArchiveWriter::create_beside(path, take_info(options, sequence, stage, chosen), options.overwrite);
-        if (!archive.ok()) return archive.error();
-        planned.push_back({path, chosen, std::move(*archive)});
-        return Done{};
-    };
-    if (const Status added = add(options.output, targets); !added.ok()) return added.error();
-    for (const std::string& also : options.also) {
-        const size_t equals = also.find('=');
-        if (targets.every == 0 || equals == std::string::npos || equals + 1 == also.size())
-            return fail("--also " + also + ": give --fps, and QUALITY=ARCHIVE, as none=uncompensated.rfa");
-        auto quality = motion_quality(also.substr(0, equals));
-        if (!quality.ok()) return quality.error();
-        if (const Status added = add(also.substr(equals + 1), {targets.every, std::move(*quality)}); !added.ok())
-            return added.error();
-    }
-    return planned;
+    say(notes_on_targets(options, sequence, targets));
 }
 
 TakeSinks sinks_of(std::vector<PlannedArchive>& planned, const TakeOptions& options, std::optional<LineFile>& account,

@@ -9,43 +9,20 @@
 
 #include "image/line_file.hpp"
 #include "stagectl/sequence_options.hpp"
-#include "take/take.hpp"
+#include "take/take_choices.hpp"
 
 namespace ols {
 
-struct TakeOptions {
+struct TakeOptions : TakeChoices {
     SequenceOptions sequence;
-    std::string output, calibration, frames;
-    TakeInfo slate;
-    std::string fill = "none", estimate = "none", quality;
-    std::vector<std::string> also;  // QUALITY=ARCHIVE
-    double fps = 0;
-    int witness_step = TakeDescription{}.witness_step;
-    bool nominal = false, overwrite = false, single_float = false, json = false;
+    std::string frames;  // file for a line a frame
+    bool json = false;
 
     void add_to(CLI::App& verb);
 };
 
-// An archive that the take is to make.
-struct PlannedArchive {
-    std::string path;
-    TakeTargets targets;
-    ArchiveWriter archive;
-};
-
-Result<Calibration> open_calibration(const TakeOptions& options, const StageConfig& stage);
-
-TakeMasks masks_of(const TakeOptions& options);
-
-// Errors: options that contradict each other, a sequence too short.
-Result<TakeTargets> targets_of(const TakeOptions& options, const Sequence& sequence);
-
 // Says on stderr what the options come to: exact rates, long cycles.
 void say_targets(const TakeOptions& options, const Sequence& sequence, const TakeTargets& targets);
-
-// The archive of -o, and those of --also, all made beside.
-Result<std::vector<PlannedArchive>> plan_archives(const TakeOptions& options, const Sequence& sequence,
-                                                  const StageConfig& stage, const TakeTargets& targets);
 
 // The sinks of these archives; frames that have their slot are told to `account`, which is opened with the first of them.
 TakeSinks sinks_of(std::vector<PlannedArchive>& planned, const TakeOptions& options, std::optional<LineFile>& account,

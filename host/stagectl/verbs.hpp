@@ -8,6 +8,14 @@
 namespace ols {
 
 void add_run_verb(CLI::App& app, int& exit_code);
+void add_serve_verb(CLI::App& app, int& exit_code);
+void add_arm_verb(CLI::App& app, int& exit_code);
+void add_record_verb(CLI::App& app, int& exit_code);
+void add_stop_verb(CLI::App& app, int& exit_code);
+void add_takes_verb(CLI::App& app, int& exit_code);
+void add_preview_verb(CLI::App& app, int& exit_code);
+void add_log_verb(CLI::App& app, int& exit_code);
+void add_reload_verb(CLI::App& app, int& exit_code);
 void add_play_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);
 void add_sequence_verb(CLI::App& app, int& exit_code);

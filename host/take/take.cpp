@@ -215,14 +215,15 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
     TakeMonitor& monitor = sinks.monitor ? *sinks.monitor : own_monitor;
     const auto rooms = make_frame_rooms(take, sinks.outputs);
     if (!rooms.ok()) return rooms.error();
-    return develop_take(
-        take, origin_of(devices.board), sinks, monitor, *rooms, [&](const std::vector<RecordSink>& camera_sinks) {
-            std::vector<RecordedCamera> recorded;
-            for (size_t camera = 0; camera < cameras; ++camera)
-                recorded.push_back({*devices.cameras[camera], uint32_t(camera),
-                                    measured_black(take.calibration, camera), camera_sinks[camera]});
-            return record_take(devices.board, recorded, take.sequence, take.stage, stop, &monitor.record());
-        });
+    return develop_take(take, origin_of(devices.board), sinks, monitor, *rooms,
+                        [&](const std::vector<RecordSink>& camera_sinks) {
+                            std::vector<RecordedCamera> recorded;
+                            for (size_t camera = 0; camera < cameras; ++camera)
+                                recorded.push_back({*devices.cameras[camera], uint32_t(camera),
+                                                    measured_black(take.calibration, camera), camera_sinks[camera]});
+                            return record_take(devices.board, recorded, take.sequence, take.stage, stop,
+                                               &monitor.record(), devices.is_armed);
+                        });
 }
 
 Result<TakeReport> ingest_take(const TakeDescription& take, const RecordedFrames& frames, const RecordingPlace& place,

@@ -50,6 +50,7 @@ struct TakeDescription {
 struct TakeDevices {
     Board& board;
     std::vector<Camera*> cameras;  // the stage's, in their order
+    bool is_armed = false;         // the board has the sequence (arm_board())
 };
 
 // One archive that is made of the recording.

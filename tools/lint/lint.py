@@ -31,8 +31,9 @@ UPSTREAM = {
     "develop": {"image", "stage", "flow", "demultiplex"},
     "take": {"image", "stage", "device", "record", "develop", "archive"},
     "relight": {"image", "stage"},
+    "daemon": {"image", "stage", "archive", "device", "record", "take", "relight"},
     "ingest": {"image", "stage", "photographs", "record", "recordings", "take", "stagectl"},
-    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take"},
+    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take", "daemon"},
 }
 # Which rooms of host/ a program of tools/ may include.
 TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "archive", "relight"}, "stagesim": {"image", "stage", "flow", "relight"}}

@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "device/lamp_nodes.hpp"
 #include "device/stage_lines.hpp"
@@ -17,12 +19,12 @@ class StageWatch {
     static Result<StageWatch> open(const StageConfig& stage, StopRequest& stop);
 
     bool has_arm_button() const { return has_arm_; }
-    Status wait_for_arm();
+    Status wait_for_arm();  // until the button is pressed, or a stop is asked for
 
     // From here on trouble asks for a stop with its reason, and the tally is lit. Errors say what stands against it.
     Status begin_take();
-    // Dark again; warnings and what became of edges are printed.
-    void end_take();
+    // Dark again. What there is to say of the lines: warnings, and what became of edges.
+    std::vector<std::string> end_take();
 
     // {"gpio": [...], "lamp_nodes": [...]} of what there is, for report and manifest.
     nlohmann::json account() const;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Lines and lamp nodes together.
-#include "stagectl/stage_watch.hpp"
+#include "take/stage_watch.hpp"
 
-#include <cstdio>
+#include <fmt/format.h>
 
 namespace ols {
 
@@ -24,7 +24,6 @@ Result<StageWatch> StageWatch::open(const StageConfig& stage, StopRequest& stop)
 }
 
 Status StageWatch::wait_for_arm() {
-    std::fprintf(stderr, "stagectl: waiting for the arm button\n");
     return lines_->wait_for_arm(stop_->wanted);
 }
 
@@ -36,16 +35,16 @@ Status StageWatch::begin_take() {
     return Done{};
 }
 
-void StageWatch::end_take() {
+std::vector<std::string> StageWatch::end_take() {
     if (nodes_) nodes_->end_take();
-    if (!lines_) return;
+    if (!lines_) return {};
     lines_->end_take();
-    for (const std::string& warning : lines_->warnings()) std::fprintf(stderr, "stagectl: %s\n", warning.c_str());
+    std::vector<std::string> notes = lines_->warnings();
     for (const LineReport& line : lines_->report())
         if (line.edges + line.edges_lost > 0)
-            std::fprintf(stderr, "stagectl: line '%s' (%s): %llu edges seen, %llu known to be lost\n",
-                         line.line.c_str(), line.use.c_str(), static_cast<unsigned long long>(line.edges),
-                         static_cast<unsigned long long>(line.edges_lost));
+            notes.push_back(fmt::format("line '{}' ({}): {} edges seen, {} known to be lost", line.line, line.use,
+                                        line.edges, line.edges_lost));
+    return notes;
 }
 
 nlohmann::json StageWatch::account() const {

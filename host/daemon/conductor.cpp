@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: MIT
+// States, jobs, and the devices between takes. What a take does: conduct_take.cpp.
+#include "daemon/conductor.hpp"
+
+#include <fmt/format.h>
+
+#include "exceptions.hpp"
+
+namespace ols {
+
+namespace {
+
+// Between two looks at devices that nobody uses. The board's heartbeat, without which an armed board goes dark, is some seconds.
+constexpr std::chrono::milliseconds look_pause(500);
+// For what has begun to be over, from a stop on: the board has Patience::stop_ms for it, and then it is known not to answer.
+constexpr std::chrono::milliseconds dark_patience(Patience::stop_ms + 2000);
+
+}  // namespace
+
+Conductor::Conductor(std::string config_path, StageConfig stage, EventLog& events)
+    : config_path_(std::move(config_path)), events_(events), stage_(std::move(stage)) {
+    now_.sequence = stage_.daemon.sequence;
+    look_at_devices();  // nobody is told that all is well before it was looked at
+    thread_ = std::thread([this] { work(); });
+}
+
+Conductor::~Conductor() {
+    shut_down([] {});
+}
+
+void TakeTotals::add(const TakeProgress& progress) {
+    triggers += progress.record.board.triggers_fired;
+    for (const CameraProgress& camera : progress.record.cameras) {
+        cameras[camera.index].frames += camera.frames_received;
+        cameras[camera.index].missing.add(camera.missing);
+    }
+    for (const OutputProgress& output : progress.outputs)
+        targets_written += output.targets_written, targets_missing += output.targets_missing;
+}
+
+Snapshot Conductor::snapshot() const {
+    const std::lock_guard lock(mutex_);
+    return now_;
+}
+
+StageConfig Conductor::stage() const {
+    const std::lock_guard lock(mutex_);
+    return stage_;
+}
+
+void Conductor::work() {
+    for (;;) {
+        std::function<void()> job;
+        {
+            std::unique_lock lock(mutex_);
+            changed_.wait_until(lock, next_look_, [&] { return job_ || ends_; });
+            if (ends_ && !job_) break;
+            job = job_;
+        }
+        if (!job) {
+            look_at_devices();
+            next_look_ = Clock::now() + look_pause;
+            continue;
+        }
+        const Status done = guarded("the daemon gave up what it did", [&] { return job(), Status(Done{}); });
+        if (!done) enter_fault(done.error().message, true);
+        job = {};
+        const std::lock_guard lock(mutex_);
+        job_ = {};
+        stop_.reset();  // or it would cut short what is asked of the board from now on
+        changed_.notify_all();
+    }
+    if (devices_) (void)devices_->make_dark();
+    devices_.reset();
+}
+
+Conductor::Outcome Conductor::run(const std::string& what, std::function<void(const Reply&)> job) {
+    const auto reply = std::make_shared<std::promise<Outcome>>();
+    auto replied = reply->get_future();
+    {
+        const std::lock_guard lock(mutex_);
+        if (ends_) return fail("the daemon is ending");
+        if (job_) return fail(fmt::format("the stage is busy: {} is under way; try again when it is over", job_name_));
+        stop_.reset();
+        job_name_ = what;
+        job_ = [job = std::move(job), reply] { job(reply); };
+        changed_.notify_all();
+    }
+    try {
+        return replied.get();
+    } catch (const std::future_error&) {  // the job ended without a reply: an exception, which is told as a fault
+        return fail(what + " failed: `stagectl log` says why");
+    }
+}
+
+void Conductor::change_state(DaemonState state, const std::string& text) {
+    DaemonState before;
+    {
+        const std::lock_guard lock(mutex_);
+        before = now_.state;
+        now_.state = state;
+        if (state != DaemonState::fault) now_.fault.clear(), now_.fault_is_latched = false;
+        if (state == DaemonState::idle || state == DaemonState::fault) {
+            if (now_.take) now_.totals.add(now_.take->monitor.progress());
+            now_.plan = nullptr, now_.take = nullptr;
+        }
+        changed_.notify_all();
+    }
+    if (before == state) return;
+    events_.add(EventKind::state_changed, fmt::format("{}{}{}", ols::state_name(state), text.empty() ? "" : ": ", text),
+                {{"state", ols::state_name(state)}, {"before", ols::state_name(before)}});
+}
+
+void Conductor::enter_fault(const std::string& why, bool is_latched) {
+    {
+        const std::lock_guard lock(mutex_);
+        const bool is_known = now_.state == DaemonState::fault && now_.fault == why;
+        now_.fault = why;
+        now_.fault_is_latched |= is_latched;
+        if (is_known) return;
+    }
+    plan_.reset();
+    events_.add(EventKind::fault, why, {{"latched", is_latched}});
+    change_state(DaemonState::fault, why);
+}
+
+Status Conductor::hold_devices() {
+    if (devices_) return Done{};
+    auto opened = StageDevices::open(stage_, stop_);
+    if (!opened) return opened.error();
+    devices_ = std::move(*opened);
+    const std::string account = devices_->account();
+    {
+        const std::lock_guard lock(mutex_);
+        now_.devices = account;
+    }
+    events_.add(EventKind::devices_ready, account);
+    return Done{};
+}
+
+// While nothing runs: a device that has gone is a fault, which ends by itself when all are back, unless light was to come.
+void Conductor::look_at_devices() {
+    const Snapshot before = snapshot();
+    const bool is_armed = before.state == DaemonState::armed;
+    Status there = hold_devices();
+    if (there) there = devices_->look(is_armed);
+    if (!there) {
+        devices_.reset();
+        {
+            const std::lock_guard lock(mutex_);
+            now_.devices.clear();
+        }
+        return enter_fault(there.error().message, is_armed);
+    }
+    if (before.state != DaemonState::fault || before.fault_is_latched) return;
+    events_.add(EventKind::fault_over, "board and cameras answer again");
+    change_state(DaemonState::idle);
+}
+
+Conductor::Outcome Conductor::arm(const TakeRequest& request) {
+    return run("arming", [this, request](const Reply& reply) {
+        const Status armed = arm_now(request);
+        reply->set_value(armed ? Outcome(plan_->to_json()) : Outcome(armed.error()));
+    });
+}
+
+Conductor::Outcome Conductor::record(const TakeRequest& request) {
+    return run("a take", [this, request](const Reply& reply) { record_now(request, reply); });
+}
+
+Conductor::Outcome Conductor::calibrate(const CardOptions& card) {
+    return run("a calibration", [this, card](const Reply& reply) { calibrate_now(card, reply); });
+}
+
+Conductor::Outcome Conductor::swap(const std::string& sequence_name) {
+    return run("a swap of sequences", [this, sequence_name](const Reply& reply) {
+        TakeRequest request = plan_ ? plan_->request : TakeRequest{};
+        if (const auto fits = plan_take(request, sequence_name, stage_); !fits) return reply->set_value(fits.error());
+        {
+            const std::lock_guard lock(mutex_);
+            now_.sequence = sequence_name;
+        }
+        events_.add(EventKind::sequence_swapped, "takes are recorded with sequence " + sequence_name,
+                    {{"sequence", sequence_name}});
+        if (plan_)
+            if (const Status armed = arm_now(request); !armed) return reply->set_value(armed.error());
+        reply->set_value(nlohmann::json{{"sequence", sequence_name}, {"armed", plan_.has_value()}});
+    });
+}
+
+Conductor::Outcome Conductor::clear_fault() {
+    return run("the end of a fault", [this](const Reply& reply) {
+        if (snapshot().state != DaemonState::fault) return reply->set_value(nlohmann::json{{"state", "idle"}});
+        devices_.reset();
+        Status there = hold_devices();
+        if (there)
+            if (const auto status = devices_->board().status(); status.ok() && status->state == OLS_STATE_FAULT)
+                there = devices_->board().clear_fault();
+        if (there) there = devices_->look(false);
+        if (!there) {
+            devices_.reset();
+            enter_fault(there.error().message, true);
+            return reply->set_value(there.error());
+        }
+        events_.add(EventKind::fault_over, "the fault was cleared");
+        change_state(DaemonState::idle);
+        reply->set_value(nlohmann::json{{"state", "idle"}});
+    });
+}
+
+Conductor::Outcome Conductor::reload() {
+    return run("a reading of the configuration", [this](const Reply& reply) {
+        auto read = read_stage(config_path_);
+        Status fits = Done{};
+        if (read) fits = check_words(read->daemon, *read);
+        if (read && fits && read->daemon.socket != stage_.daemon.socket)
+            fits = fail(read->daemon.places.at("socket") + " has changed: that takes a restart of the daemon");
+        if (!read || !fits) {
+            const Error& wrong = read ? fits.error() : read.error();
+            events_.add(EventKind::configuration_wrong, wrong.message + "; the configuration before stays in force");
+            return reply->set_value(wrong);
+        }
+        devices_.reset();
+        {
+            const std::lock_guard lock(mutex_);
+            stage_ = *read;
+            now_.sequence = stage_.daemon.sequence;
+            now_.devices.clear();
+        }
+        events_.add(EventKind::configuration_read, "'" + config_path_ + "' is in force");
+        next_look_ = {};
+        reply->set_value(nlohmann::json{{"configuration", config_path_}});
+    });
+}
+
+// The board is the running take's: it is told through it. Without one it is this thread's to tell.
+Conductor::Outcome Conductor::stop(const std::string& by) {
+    events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
+    const auto asked = Clock::now();
+    std::unique_lock lock(mutex_);
+    if (!job_) {
+        lock.unlock();
+        return run("a stop", [this, by](const Reply& reply) { reply->set_value(darken(by)); });
+    }
+    stop_.ask("stopped by " + by);
+    // Over when the board says that it is dark, or when there is no more that could be lit: the job has ended.
+    const auto is_dark = [&] {
+        return !job_ || now_.state == DaemonState::processing ||
+               (now_.take && now_.take->monitor.progress().record.board.dark_confirmed_ns != 0);
+    };
+    while (!is_dark() && Clock::now() - asked < dark_patience) changed_.wait_for(lock, std::chrono::milliseconds(2));
+    const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked).count();
+    const bool dark = is_dark() && now_.state != DaemonState::fault;
+    lock.unlock();
+    if (dark) return nlohmann::json{{"dark", true}, {"after_ms", after_ms}};
+    const std::string why =
+        fmt::format("the board did not confirm within {:.0f} ms that it is dark: use the emergency stop", after_ms);
+    events_.add(EventKind::not_dark, why);
+    return fail(why);
+}
+
+Conductor::Outcome Conductor::darken(const std::string& by) {
+    const auto asked = Clock::now();
+    Status dark = hold_devices();
+    if (dark) dark = devices_->make_dark();
+    if (!dark) {
+        const std::string why =
+            "the board did not confirm that it is dark: use the emergency stop if there is light; " +
+            dark.error().message;
+        events_.add(EventKind::not_dark, why);
+        return fail(why);
+    }
+    const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked).count();
+    events_.add(EventKind::dark, "the board says that it is dark", {{"after_ms", after_ms}, {"by", by}});
+    plan_.reset();
+    if (snapshot().state == DaemonState::armed) change_state(DaemonState::idle, "stopped by " + by);
+    return nlohmann::json{{"dark", true}, {"after_ms", after_ms}};
+}
+
+void Conductor::end_take(EventKind kind, const std::string& why) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (!job_ || stop_.wanted) return;
+        stop_.ask(why);
+    }
+    events_.add(kind, why);
+}
+
+void Conductor::shut_down(const std::function<void()>& progress) {
+    {
+        std::unique_lock lock(mutex_);
+        ends_ = true;
+        if (job_) stop_.ask("stopped as the daemon was told to end");
+        changed_.notify_all();
+        while (job_) {
+            changed_.wait_for(lock, std::chrono::milliseconds(250));
+            lock.unlock();
+            progress();
+            lock.lock();
+        }
+    }
+    if (thread_.joinable()) thread_.join();
+}
+
+}  // namespace ols

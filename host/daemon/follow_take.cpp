@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// The conductor's look at what runs: progress, the dark, the disk, and whether every stage of the pipeline advances.
+#include <fmt/format.h>
+
+#include "daemon/api.hpp"
+#include "daemon/conductor.hpp"
+#include "steady_clock.hpp"
+
+namespace ols {
+
+namespace {
+
+constexpr std::chrono::milliseconds progress_pause(500), missing_pause(2000);
+
+}  // namespace
+
+std::string Conductor::follow(std::chrono::seconds stuck_after) {
+    const auto take = snapshot().take;
+    if (take != followed_.take) followed_ = {take, false, 0, {}, {}, {}};
+    if (!take) return "";
+    const auto now = Clock::now();
+    const TakeProgress progress = take->monitor.progress();
+    tell_dark(progress.record.board);
+    tell_progress(progress, now);
+    watch_disk(progress);
+    return stuck_stage(progress, now, stuck_after);
+}
+
+// The state changes with the board's word, so that nobody steps to the stage by a guess.
+void Conductor::tell_dark(const BoardProgress& board) {
+    if (followed_.dark || board.dark_confirmed_ns == 0) return;
+    followed_.dark = true;
+    const double after_ms = board.stop_told_ns ? double(board.dark_confirmed_ns - board.stop_told_ns) * 1e-6 : 0;
+    events_.add(EventKind::dark,
+                board.stop_told_ns
+                    ? fmt::format("the board says that it is dark, {:.1f} ms after it was told", after_ms)
+                    : "the board says that it is dark: it has played to the end",
+                board.stop_told_ns ? nlohmann::json{{"after_ms", after_ms}} : nlohmann::json::object());
+    {
+        const std::lock_guard lock(mutex_);
+        if (now_.state != DaemonState::recording || now_.take != followed_.take) return;
+    }
+    change_state(DaemonState::processing);
+}
+
+void Conductor::tell_progress(const TakeProgress& progress, Clock::time_point now) {
+    if (now < followed_.next_progress) return;
+    followed_.next_progress = now + progress_pause;
+    events_.add(EventKind::take_progress, followed_.take->name, progress_json(*followed_.take));
+    CauseCounts missing;
+    for (const CameraProgress& camera : progress.record.cameras) missing.add(camera.missing);
+    if (missing.total() == followed_.missing || now < followed_.next_missing) return;
+    followed_.missing = missing.total();
+    followed_.next_missing = now + missing_pause;
+    events_.add(EventKind::slots_missing,
+                fmt::format("{} slots missing so far: {}", missing.total(), missing.to_words()),
+                {{"missing", missing.to_json()}});
+}
+
+// What is recorded and not written yet needs its room, too.
+void Conductor::watch_disk(const TakeProgress& progress) {
+    if (followed_.dark || followed_.take->target_bytes == 0) return;
+    const StageConfig stage = this->stage();
+    const auto free = bytes_free_in(stage.daemon.takes);
+    uint64_t waiting = 0;
+    for (const OutputProgress& output : progress.outputs) waiting += output.targets_waiting + 2;
+    const uint64_t reserve = uint64_t(stage.daemon.reserve_mb) * 1'000'000;
+    if (!free) return end_take(EventKind::disk_full, free.error().message);
+    if (*free > reserve + waiting * followed_.take->target_bytes) return;
+    end_take(
+        EventKind::disk_full,
+        fmt::format("the disk of '{}' has {} left and {} are kept: the take ends here, and what it has is finished",
+                    stage.daemon.takes, bytes_words(*free), bytes_words(reserve)));
+}
+
+std::string Conductor::stuck_stage(const TakeProgress& progress, Clock::time_point now,
+                                   std::chrono::seconds stuck_after) {
+    for (const StageProgress& stage : progress.record.stages) {
+        auto& [beats, since] = followed_.beats[stage.name];
+        if (beats != stage.beats || since == Clock::time_point() || stage.activity != StageActivity::works)
+            beats = stage.beats, since = now;
+        if (now - since > stuck_after) return stage.name;
+    }
+    return "";
+}
+
+}  // namespace ols

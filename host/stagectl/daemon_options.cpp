@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// Options into parameters of calls.
+#include "stagectl/daemon_options.hpp"
+
+#include <fmt/format.h>
+
+#include "develop/motion_quality.hpp"
+
+namespace ols {
+
+void DaemonLink::add_to(CLI::App& verb) {
+    verb.add_option("--socket", socket, "where the daemon listens; otherwise $STAGECTL_SOCKET")->capture_default_str();
+}
+
+void TakeParams::add_to(CLI::App& verb, bool with_slate) {
+    verb.add_option("--seconds", seconds, "length of the take; otherwise as configured")->check(CLI::PositiveNumber);
+    verb.add_option("--fps", fps, "a performance: targets a second; 0: one target a cycle; otherwise as configured")
+        ->check(CLI::NonNegativeNumber);
+    verb.add_option("--quality", quality, "motion compensation of a performance; otherwise as configured")
+        ->check(CLI::IsMember(motion_quality_names()));
+    verb.add_flag("--memory-only", memory_only, "spill no frames to a disk, whatever is configured");
+    if (!with_slate) return;
+    verb.add_option("--slate", slate, "the take is SLATE_NUMBER; otherwise as configured");
+    verb.add_option("--take", number, "its number; otherwise one above the slate's highest")
+        ->check(CLI::PositiveNumber);
+    verb.add_option("--notes", notes, "kept with the take");
+}
+
+nlohmann::json TakeParams::to_json() const {
+    auto params = nlohmann::json::object();
+    if (seconds) params["seconds"] = *seconds;
+    if (fps) params["fps"] = *fps;
+    if (!quality.empty()) params["quality"] = quality;
+    if (memory_only) params["memory_only"] = true;
+    if (!slate.empty()) params["slate"] = slate;
+    if (number) params["number"] = *number;
+    if (!notes.empty()) params["notes"] = notes;
+    return params;
+}
+
+std::string event_line(const nlohmann::json& event) {
+    const std::string time = event.value("time", "");
+    return fmt::format("{} {} {} {}: {}", time.size() > 19 ? time.substr(11, 12) : time, event.value("level", ""),
+                       event.value("code", 0), event.value("event", ""), event.value("text", ""));
+}
+
+}  // namespace ols

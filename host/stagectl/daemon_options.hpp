@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// What the verbs that ask the daemon share.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "daemon/client.hpp"
+
+namespace ols {
+
+// --socket: where the daemon listens.
+struct DaemonLink {
+    std::string socket = default_socket();
+
+    void add_to(CLI::App& verb);
+    Result<DaemonClient> connect() const { return DaemonClient::connect(socket); }
+};
+
+// What a take is to be, where it is not as the daemon's configuration says.
+struct TakeParams {
+    std::optional<double> seconds, fps;
+    std::optional<int> number;
+    std::string slate, notes, quality;
+    bool memory_only = false;
+
+    void add_to(CLI::App& verb, bool with_slate);
+    nlohmann::json to_json() const;
+};
+
+// One call, its result printed by `print`, or as JSON with `json`. The verb's exit code.
+template <typename Print>
+Result<int> call_and_print(const DaemonLink& link, const std::string& method, const nlohmann::json& params,
+                           const Print& print) {
+    auto client = link.connect();
+    if (!client.ok()) return client.error();
+    const auto result = client->call(method, params);
+    if (!result.ok()) return result.error();
+    print(*result);
+    return 0;
+}
+
+// "12:00:01 warning 306 slots_missing: ..." of an event.
+std::string event_line(const nlohmann::json& event);
+
+}  // namespace ols
