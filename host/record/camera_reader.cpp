@@ -71,7 +71,8 @@ void CameraReader::read() {
 void CameraReader::count_drops() {
     const uint64_t more = camera_.counts().dropped - dropped_before_ - drops();
     if (more == 0) return;
-    (options_.waits_for_disk && options_.waits_for_disk() ? disk_drops_ : host_drops_) += more;
+    const bool is_disk = options_.room->waits_for_disk() || (options_.waits_for_disk && options_.waits_for_disk());
+    (is_disk ? disk_drops_ : host_drops_) += more;
     monitor_.change_camera(
         place_, [this](CameraProgress& camera) { camera.disk_drops = disk_drops_, camera.host_drops = host_drops_; });
 }
@@ -95,12 +96,7 @@ void CameraReader::enqueue(Frame frame) {
         news.witness.summary = summarize_frame(frame, frame.black, config_.noise);
         news.bits = bits_.read(frame);
     }
-    const size_t bytes = frame.samples.size();
-    options_.room->hold(bytes);
-    news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = options_.room, bytes](Frame* last) {
-        delete last;
-        room->let_go(bytes);
-    });
+    news.frame = options_.room->adopt(std::move(frame));
     monitor_.change_camera(place_, [](CameraProgress& camera) { ++camera.frames_received; });
     queue_.push(std::move(news));
 }

@@ -19,7 +19,9 @@ class Reading : public testing::Test {
         config_.width = 16, config_.height = 8;
         ASSERT_TRUE(camera_.set_up(config_).ok());
         ASSERT_TRUE(camera_.start().ok());
-        const auto frames = std::make_shared<FrameRoom>(frames_max);
+        FrameRoom::Options options;
+        options.frames_max = frames_max, options.frame_bytes = 16 * 8 * 2;
+        const auto frames = *FrameRoom::create(options);
         monitor_.add_camera(0, frames);
         reader_.emplace(camera_, config_,
                         CameraReaderOptions{std::nullopt, frames, [this] { return disk_is_late_.load(); }}, queue_,
