@@ -6,7 +6,7 @@ HOST := build/host
 CHECKED := build/checked
 SIDE_BY_SIDE := $(MAKE) --no-print-directory -j2 --output-sync=target
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil daemon-test soak guest-test fuzz-smoke \
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test soak guest-test fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -34,7 +34,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke daemon-test hil guest-test ## everything that needs no hardware
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke daemon-test hil matrix-pytest guest-test ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
@@ -74,6 +74,9 @@ soak: all ## an hour and more of takes with random faults by the daemon (TAKES=n
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(SIDE_BY_SIDE) hil-pytest capture-pytest
+
+matrix: host ## every fault between trigger and frame, a thousand times on each camera link: docs/faults.md
+	@$(PYTHON) tests/matrix/matrix.py --page docs/faults.md
 
 guest-test: all ## stagectl on the real kernel's CAN, USB, V4L2 and GPIO, in a QEMU guest (the first time some 220 MB to download)
 	@$(PYTHON) -m pytest -q tests/guest

@@ -10,6 +10,7 @@
 
 #include "device/aravis_frame.hpp"
 #include "device/aravis_link.hpp"
+#include "device/buffer_starvation.hpp"
 #include "device/camera_clock.hpp"
 #include "device/delivery_count.hpp"
 #include "device/library_thread.hpp"
@@ -28,6 +29,7 @@ constexpr uint64_t life_patience_ns = uint64_t(Camera::device_patience_ms) * 1'0
 struct Acquisition {
     std::shared_ptr<AravisStream> stream;
     std::unique_ptr<AravisFrames> frames;
+    BufferStarvation starvation;
     uint64_t started_ns = 0;  // of the camera's time; 0 when it cannot be asked
     bool tells_end = false;   // it says itself whether it is acquiring
 };
@@ -99,7 +101,6 @@ class AravisCamera : public Camera {
         }
         const uint64_t started_ns = begun->first->started_ns;
         delivery_.start(started_ns);
-        unplaced_ = incomplete_ = 0;
         watch_->running = std::move(begun->first);
         const std::lock_guard lock(mutex_);
         chosen_ = std::move(begun->second);
@@ -183,6 +184,7 @@ class AravisCamera : public Camera {
                                    if (const auto thread = library.lock()) thread->post([last] { delete last; });
                                }};
         acquisition->frames = std::make_unique<AravisFrames>(link, setup, index);
+        acquisition->starvation.start(acquisition->stream->free_buffers(), acquisition->stream->unplaced());
         const auto camera_ns = link.time_ns();
         acquisition->started_ns = camera_ns.value_or(0);
         watch.clock.start(camera_ns, steady_ns());
@@ -199,25 +201,24 @@ class AravisCamera : public Camera {
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
         Frame frame = new_frame();
+        acquisition.starvation.take(acquisition.stream->unplaced());
         auto kind = acquisition.frames->read(buffer, frame);
         if (kind == AravisFrames::Kind::whole && acquisition.stream->is_disowned(buffer))
             kind = AravisFrames::Kind::incomplete;
         underrun_ += kind == AravisFrames::Kind::incomplete;
-        incomplete_ += kind == AravisFrames::Kind::incomplete;
         if (kind != AravisFrames::Kind::whole) return std::nullopt;
         const uint64_t missing = delivery_.counts().missing_ids;
         if (!delivery_.take(frame.stamp)) return std::nullopt;
-        count_dropped(*acquisition.stream, int64_t(delivery_.counts().missing_ids - missing));
+        count_dropped(acquisition.starvation, int64_t(delivery_.counts().missing_ids - missing));
         watch_->life_ns = steady_ns();
         if (!acquisition.stream->has_waiting()) watch_->clock.frame_came(frame.stamp.timestamp_ns, steady_ns());
         return frame;
     }
 
-    // Ids that were passed over while packets found no buffer, but for those whose buffers came incomplete.
-    void count_dropped(const AravisStream& stream, int64_t gap) {
-        const uint64_t unplaced = stream.unplaced();
-        if (gap > 0 && unplaced != unplaced_) dropped_ += uint64_t(std::max<int64_t>(gap - int64_t(incomplete_), 0));
-        if (gap > 0) unplaced_ = unplaced, incomplete_ = 0;
+    // Ids that were passed over while packets found no buffer.
+    void count_dropped(BufferStarvation& starvation, int64_t gap) {
+        const bool is_starved = starvation.explains_gap();
+        if (is_starved && gap > 0) dropped_ += uint64_t(gap);
     }
 
     std::optional<Error> why_gone() const {
@@ -250,7 +251,6 @@ class AravisCamera : public Camera {
     std::string chosen_;
     std::atomic<uint64_t> stops_ = 0, dropped_ = 0, underrun_ = 0;
     DeliveryCount delivery_;
-    uint64_t unplaced_ = 0, incomplete_ = 0;  // at the last gap; since it
 };
 
 }  // namespace

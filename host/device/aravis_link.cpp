@@ -135,6 +135,12 @@ bool AravisStream::has_waiting() const {
     return full > 0;
 }
 
+size_t AravisStream::free_buffers() const {
+    int empty = 0, full = 0;
+    arv_stream_get_n_buffers(stream_.get(), &empty, &full);
+    return size_t(std::max(empty, 0));
+}
+
 uint64_t AravisStream::unplaced() const {
     uint64_t completed = 0, failures = 0, underruns = 0;
     arv_stream_get_statistics(stream_.get(), &completed, &failures, &underruns);

@@ -27,6 +27,7 @@ class AravisStream {
     bool is_disowned(ArvBuffer* buffer) const;
 
     bool has_waiting() const;
+    size_t free_buffers() const;  // that wait to be filled
     // So many packets, of USB3 frames, found no buffer to go to, since the stream began.
     uint64_t unplaced() const;
     uint64_t resent_packets() const;

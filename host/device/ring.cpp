@@ -189,9 +189,10 @@ RingWriter::Outcome RingWriter::write(const Frame& frame, bool wait, const std::
         if (cancelled.load()) return Outcome::cancelled;
         futex_wait(header.tail_futex, seen, 100);
     }
-    const RingFrame meta{frame.camera, frame.width,       frame.height,         frame.format,
-                         frame.cfa,    frame.pitch_bytes, frame.stamp.frame_id, frame.stamp.timestamp_ns,
-                         frame.black,  frame.white,       frame.samples.size()};
+    const RingFrame meta{
+        frame.camera, frame.width,       frame.height,         frame.format,
+        frame.cfa,    frame.pitch_bytes, frame.stamp.frame_id, frame.stamp.timestamp_ns,
+        frame.black,  frame.white,       frame.samples.size(), header.dropped.load(std::memory_order_relaxed)};
     std::byte* record = mapping_->record(head);
     std::memcpy(record, &meta, sizeof meta);
     std::memcpy(record + sizeof meta, frame.samples.data(), frame.samples.size());
@@ -220,6 +221,7 @@ struct RingReader::State {
 
     RingMapping mapping;
     std::atomic<uint64_t> tail = 0;
+    std::atomic<uint64_t> dropped = 0;  // before the last frame that was read
     std::atomic<bool> wanted = false;   // from a start, answered or not, to the stop
     std::atomic<bool> running = false;  // from the answer to a start to the stop
     std::atomic<bool> closed = false;   // the writer has said so once
@@ -364,6 +366,7 @@ Frame RingReader::take_frame(Frame frame) {
         const std::byte* samples = record + sizeof meta;
         frame.samples.assign(samples, samples + size_t(meta.pitch_bytes) * meta.height);
     }
+    state_->dropped = std::max(state_->dropped.load(), meta.dropped_before);
     ++state_->tail;
     mapping.header().tail.store(state_->tail, std::memory_order_release);
     futex_wake(mapping.header().tail_futex);
@@ -375,7 +378,9 @@ uint64_t RingReader::watermark_ns() const {
 }
 
 uint64_t RingReader::dropped() const {
-    return state_->mapping.header().dropped.load(std::memory_order_relaxed);
+    const RingHeader& header = state_->mapping.header();
+    const uint64_t all = header.dropped.load(std::memory_order_acquire);
+    return header.head.load(std::memory_order_acquire) == state_->tail ? all : state_->dropped.load();
 }
 
 RingReader::Writer RingReader::writer() const {

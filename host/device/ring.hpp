@@ -27,7 +27,7 @@
 
 namespace ols {
 
-constexpr uint64_t ring_magic = 0x32474e4952534c4f;  // "OLSRING2", little-endian
+constexpr uint64_t ring_magic = 0x33474e4952534c4f;  // "OLSRING3", little-endian
 
 // What the frames are, as the writer's camera is set up; a frame that failed to be may come smaller.
 struct RingContent {
@@ -76,7 +76,8 @@ struct RingFrame {
     uint32_t pitch_bytes;
     uint64_t frame_id, timestamp_ns;
     float black, white;
-    uint64_t bytes;  // samples that follow
+    uint64_t bytes;           // samples that follow
+    uint64_t dropped_before;  // RingHeader::dropped, before this frame
 };
 
 constexpr uint32_t ring_slots_max = 1 << 16, ring_size_max = 1 << 14;  // records; pixels a side
@@ -142,6 +143,7 @@ class RingReader {
     std::optional<Frame> read(
         int timeout_ms, const std::function<Frame()>& new_frame = [] { return Frame(); });
     uint64_t watermark_ns() const;
+    // Frames that found no room, of those before the last one that was read; once all are read, of all.
     uint64_t dropped() const;
 
     enum class Writer { live, closed, gone, broken };

@@ -12,6 +12,10 @@ namespace ols {
 
 namespace {
 
+// Frames that wait in a camera's own buffers, at most: 1024 of GigE Vision's, 256 of the virtual stage's ring, 32 of V4L2's; and some that
+// were being filled or read, and the one behind the gap.
+constexpr int backlog_max = 1100;
+
 // Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
 bool is_whole(const Frame& frame, const CameraConfig& config) {
     const size_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
@@ -50,29 +54,44 @@ void CameraReader::read() {
     while (!end_) {
         count_drops();
         beat_.beat(StageActivity::waits_for_room);
-        if (!options_.room->take_place(std::chrono::milliseconds(pause_ms))) continue;
+        if (!take_place()) continue;
         beat_.beat();
         CameraState state = camera_.state();
         const bool is_live = state.kind == CameraState::live;
         const uint64_t watermark_ns = camera_.watermark_ns();
         auto frame = camera_.read(pause_ms);
         count_drops();
+        frames_behind_disk_ -= frames_behind_disk_ > 0;
         if (frame) {
             enqueue(std::move(*frame));
             continue;
         }
         options_.room->give_back_place();
+        frames_behind_disk_ = 0;
         queue_.push(CameraPause{watermark_ns, std::move(state), disk_drops_, host_drops_});
         if (!is_live) return;
     }
 }
 
-// The camera says how many it had no room for; what filled the room is known here, at the time.
+// What holds the room is known while there is none. The camera may say how many it dropped only when the frame behind them is read, and
+// that comes behind all that its buffers hold: by then the disk may long have gone on.
+bool CameraReader::take_place() {
+    if (options_.room->take_place(std::chrono::milliseconds(0))) return true;
+    const auto look = [this] {
+        if (options_.room->waits_for_disk() || (options_.waits_for_disk && options_.waits_for_disk()))
+            frames_behind_disk_ = backlog_max;
+    };
+    look();
+    const bool has_place = options_.room->take_place(std::chrono::milliseconds(pause_ms));
+    look();
+    return has_place;
+}
+
+// The camera says how many it had no room for.
 void CameraReader::count_drops() {
     const uint64_t more = camera_.counts().dropped - dropped_before_ - drops();
     if (more == 0) return;
-    const bool is_disk = options_.room->waits_for_disk() || (options_.waits_for_disk && options_.waits_for_disk());
-    (is_disk ? disk_drops_ : host_drops_) += more;
+    (frames_behind_disk_ > 0 ? disk_drops_ : host_drops_) += more;
     monitor_.change_camera(
         place_, [this](CameraProgress& camera) { camera.disk_drops = disk_drops_, camera.host_drops = host_drops_; });
 }

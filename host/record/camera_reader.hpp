@@ -59,6 +59,7 @@ class CameraReader {
 
   private:
     void read();
+    bool take_place();
     void count_drops();
     void take_levels(Frame& frame) const;
     void enqueue(Frame frame);
@@ -74,6 +75,7 @@ class CameraReader {
     const uint64_t dropped_before_;
     std::atomic<uint64_t> disk_drops_ = 0, host_drops_ = 0;
     std::atomic<uint64_t> arrivals_ = 0;
+    int frames_behind_disk_ = 0;  // still to be read, that may have come while the disk held the room
     std::atomic<bool> end_ = false;
     std::thread thread_;
 };

@@ -17,6 +17,9 @@ std::vector<SlotKind> kinds_of(const Sequence& sequence) {
 }
 
 const Reason off_grid = {Cause::not_proved, "its time fits no trigger"};
+// Frames in a row that fit each other, and not the frames before, until it is the camera's clock that is taken to be another: two
+// stamps that are wrong alike come of one moment in which a machine was late.
+constexpr size_t new_clock_frames = 4;
 const std::string in_the_dark = "dark, as the last tracking slot before it";
 
 }  // namespace
@@ -50,7 +53,7 @@ void FramePlacer::bound(uint64_t arrivals, uint64_t fired) {
         if (frame.arrival < arrivals) frame.fired_before = std::min(frame.fired_before, fired);
     };
     window_.for_each(tell);
-    if (stray_) tell(*stray_);
+    for (FrameWitness& stray : strays_) tell(stray);
     for (Pending& pending : unlocked_) tell(pending.frame);
     bound_arrivals_ = arrivals;
     bound_fired_ = fired;
@@ -58,36 +61,55 @@ void FramePlacer::bound(uint64_t arrivals, uint64_t fired) {
 
 void FramePlacer::end() {
     while (auto next = window_.take(true)) process(std::move(*next));
-    if (stray_) refuse(*stray_, off_grid);
-    stray_.reset();
+    refuse_strays();
     end_stretch();
+}
+
+void FramePlacer::refuse_strays() {
+    for (const FrameWitness& stray : strays_) {
+        refuse(stray, stray.unfit.empty() ? off_grid : stray.unfit);
+        if (stray.epoch == last_epoch_) stray_ids_.push_back(stray.stamp.frame_id);
+    }
+    strays_.clear();
+}
+
+// On one grid, with ids that step as times do.
+bool FramePlacer::fit_each_other(const std::vector<FrameWitness>& frames) const {
+    for (size_t n = 1; n < frames.size(); ++n) {
+        const TriggerGrid grid(period_ns_, frames[n - 1].stamp.timestamp_ns, code_.cycle_slots());
+        const auto steps = grid.steps_to(frames[n].stamp.timestamp_ns);
+        if (!steps || *steps != frames[n].stamp.frame_id - frames[n - 1].stamp.frame_id ||
+            frames[n].epoch != frames[n - 1].epoch)
+            return false;
+    }
+    return true;
 }
 
 void FramePlacer::process(FrameWitness frame) {
     has_seen_light_ = has_seen_light_ || !frame.unfit.empty() || !is_dark(frame.summary);
     if (!grid_) return begin_stretch(std::move(frame), {Cause::no_frame, "before the camera's first frame"});
-    if (append(frame)) {
-        if (stray_) refuse(*stray_, off_grid);
-        stray_.reset();
+    if (const auto steps = steps_on_grid(frame)) {
+        refuse_strays();
+        append(frame, *steps);
+        stray_ids_.clear();
         return;
     }
-    // Two frames in a row that fit each other but not the grid: the camera's clock was set anew.
-    if (stray_ && stray_->epoch == frame.epoch) {
-        const TriggerGrid stray_grid(period_ns_, stray_->stamp.timestamp_ns, code_.cycle_slots());
-        const auto steps = stray_grid.steps_to(frame.stamp.timestamp_ns);
-        if (steps && *steps == frame.stamp.frame_id - stray_->stamp.frame_id) {
-            end_stretch();
-            ++camera_restarts_;
-            begin_stretch(std::move(*stray_), {Cause::restarted,
-                                               "the camera's clock was set anew, and no frame is proved to be this "
-                                               "one"});
-            stray_.reset();
-            append(frame);
-            return;
-        }
+    // Frames in a row that fit each other but not the grid: the camera's clock was set anew.
+    FrameWitness newest = frame;
+    strays_.push_back(std::move(frame));
+    if (!fit_each_other(strays_)) {
+        strays_.pop_back();
+        refuse_strays();
+        strays_.push_back(std::move(newest));
     }
-    if (stray_) refuse(*stray_, off_grid);
-    stray_ = std::move(frame);
+    if (strays_.size() < new_clock_frames) return;
+    end_stretch();
+    stray_ids_.clear();
+    ++camera_restarts_;
+    std::vector<FrameWitness> frames = std::exchange(strays_, {});
+    begin_stretch(std::move(frames.front()),
+                  {Cause::restarted, "the camera's clock was set anew, and no frame is proved to be this one"});
+    for (size_t n = 1; n < frames.size(); ++n) append(frames[n], *grid_->steps_to(frames[n].stamp.timestamp_ns));
 }
 
 void FramePlacer::begin_stretch(FrameWitness frame, Reason gap) {
@@ -100,21 +122,36 @@ void FramePlacer::begin_stretch(FrameWitness frame, Reason gap) {
     place({std::move(frame), 0, true, {std::move(gap)}});
 }
 
-// Adds a frame to the stretch if its time lies on the grid and the sequence has a trigger there.
-bool FramePlacer::append(FrameWitness& frame) {
+// How many triggers a frame lies behind the last one, if its time lies on the grid, the sequence has a trigger there, and the board had
+// fired it when the frame was here.
+std::optional<uint64_t> FramePlacer::steps_on_grid(const FrameWitness& frame) const {
     const auto steps = grid_->steps_to(frame.stamp.timestamp_ns);
-    if (!steps || lowest_first_counter() + last_position_ + *steps >= trigger_count_) return false;
-    grid_->advance(*steps, frame.stamp.timestamp_ns);
+    if (!steps || (frame.epoch == last_epoch_ && !can_have_passed(*steps, frame.stamp.frame_id))) return std::nullopt;
+    const uint64_t counter = lowest_first_counter() + last_position_ + *steps;
+    if (counter >= trigger_count_ || (locked_ && counter >= frame.fired_before)) return std::nullopt;
+    return steps;
+}
+
+// Whether so many triggers can have passed by the camera's time while it counted up to that id. More ids than triggers there are not; and
+// where triggers that it did not count make whole groups, it is as well the clock that jumped by these: the next landmarks look the same.
+bool FramePlacer::can_have_passed(uint64_t steps, uint64_t frame_id) const {
+    const uint64_t id_steps = frame_id - last_stamp_.frame_id;
+    if (id_steps > steps) return id_steps - steps <= strays_.size();
+    return id_steps == steps || (steps - id_steps) % group_slots_ != 0;
+}
+
+// Adds a frame that lies so far behind the last one to the stretch.
+void FramePlacer::append(FrameWitness& frame, uint64_t steps) {
+    grid_->advance(steps, frame.stamp.timestamp_ns);
     const bool restarted = frame.epoch != last_epoch_;
     const uint64_t id_steps = frame.stamp.frame_id - last_stamp_.frame_id;
     camera_restarts_ += restarted;
     std::vector<Reason> gap = restarted ? std::vector<Reason>{{Cause::restarted, "the camera was restarted"}}
-                                        : losses(frame, *steps, id_steps);
+                                        : losses(frame, steps, id_steps);
     last_stamp_ = frame.stamp;
     last_epoch_ = frame.epoch;
-    last_position_ += *steps;
-    place({std::move(frame), last_position_, restarted || id_steps != *steps, std::move(gap)});
-    return true;
+    last_position_ += steps;
+    place({std::move(frame), last_position_, restarted || id_steps != steps, std::move(gap)});
 }
 
 // Why the triggers between the frame before and this one have none: of as many as ids were passed over, the frames were lost on
@@ -122,12 +159,24 @@ bool FramePlacer::append(FrameWitness& frame) {
 // is not known: the numbers are right, and their order here is not.
 std::vector<Reason> FramePlacer::losses(const FrameWitness& frame, uint64_t steps, uint64_t id_steps) {
     const uint64_t gap = steps - 1;
-    const uint64_t lost = id_steps == 0 ? 0 : std::min(gap, id_steps - 1);
+    const uint64_t without = id_steps == 0 ? 0 : std::min(gap, id_steps - 1);
+    const uint64_t lost = without - std::min<uint64_t>(without, stray_ids_.size());
     std::vector<Reason> reasons = take_drops(lost, frame.disk_drops, frame.host_drops);
     reasons.resize(lost, {Cause::link_lost_it, "lost: the camera counted the frame and it did not come"});
-    reasons.insert(reasons.end(), gap - lost, {Cause::camera_missed_trigger, "the camera did not count the trigger"});
+    name_strays(reasons, without);
+    reasons.insert(reasons.end(), gap - without,
+                   {Cause::camera_missed_trigger, "the camera did not count the trigger"});
     if (reasons.empty()) reasons.push_back({Cause::no_frame, "no frame came"});
     return reasons;
+}
+
+// Frames of a gap that came, and were refused for their times: where they are among its ids is known.
+void FramePlacer::name_strays(std::vector<Reason>& reasons, uint64_t without) const {
+    for (const uint64_t id : stray_ids_) {
+        if (reasons.size() >= without) return;
+        const auto at = ptrdiff_t(std::min<uint64_t>(id - last_stamp_.frame_id - 1, reasons.size()));
+        reasons.insert(reasons.begin() + at, off_grid);
+    }
 }
 
 // Of the drops that were told of, those that no gap was found for yet, `count` at most.
@@ -218,7 +267,8 @@ void FramePlacer::examine(Pending pending) {
     if (sight == Sight::proves) {
         accept_waiting();
     } else if (sight == Sight::disagrees) {
-        const bool no_light = code_.kind_at(counter) == SlotKind::tracking && is_dark(frame.summary);
+        // A lit landmark that is dark: a dark slot that looks lit is the other way round.
+        const bool no_light = code_.kind_at(counter) != SlotKind::dark && is_dark(frame.summary);
         refuse_waiting(
             {no_light ? Cause::no_light : Cause::not_proved,
              fmt::format("the optical code disagrees: trigger {} {} a {} slot", counter,
@@ -269,12 +319,14 @@ void FramePlacer::accept_waiting() {
     waiting_.clear();
 }
 
-// Where it is light that was missing, frames that have some are only not proved.
+// Where it is light that was missing, frames that have some are only not proved. What is wrong with a frame itself stays the reason.
 void FramePlacer::refuse_waiting(const Reason& why) {
     for (const Pending& pending : waiting_) {
-        const bool is_lit = why.cause == Cause::no_light && !is_dark(pending.frame.summary);
-        placements_.push_back({pending.frame.arrival, counter_of(pending), false,
-                               is_lit ? Reason{Cause::not_proved, why.text} : why, pending.optical});
+        const FrameWitness& frame = pending.frame;
+        const bool is_lit = why.cause == Cause::no_light && !is_dark(frame.summary);
+        const Reason own = is_lit ? Reason{Cause::not_proved, why.text} : why;
+        placements_.push_back(
+            {frame.arrival, counter_of(pending), false, frame.unfit.empty() ? own : frame.unfit, pending.optical});
     }
     waiting_.clear();
 }

@@ -84,14 +84,19 @@ class FramePlacer {
     };
 
     void process(FrameWitness frame);
-    bool append(FrameWitness& frame);
+    std::optional<uint64_t> steps_on_grid(const FrameWitness& frame) const;
+    bool can_have_passed(uint64_t steps, uint64_t frame_id) const;
+    void append(FrameWitness& frame, uint64_t steps);
     void begin_stretch(FrameWitness frame, Reason gap);
+    bool fit_each_other(const std::vector<FrameWitness>& frames) const;
+    void refuse_strays();
     void end_stretch();
     void end_run();
     void place(Pending pending);
     uint64_t triggers_until(uint64_t timestamp_ns) const;
     void try_lock();
     std::vector<Reason> losses(const FrameWitness& frame, uint64_t steps, uint64_t id_steps);
+    void name_strays(std::vector<Reason>& reasons, uint64_t without) const;
     std::vector<Reason> take_drops(uint64_t count, uint64_t disk_drops, uint64_t host_drops);
     void give_up_oldest(size_t count, const Reason& why);
     Reason nothing_fits() const;
@@ -118,7 +123,8 @@ class FramePlacer {
 
     // The stretch.
     std::optional<TriggerGrid> grid_;
-    std::optional<FrameWitness> stray_;  // off the grid: a bad stamp, or the first of a new stretch
+    std::vector<FrameWitness> strays_;  // off the grid: bad stamps, or the first of a new stretch
+    std::vector<uint64_t> stray_ids_;   // of those that were refused since the last frame on the grid
     CameraStamp last_stamp_;
     uint32_t last_epoch_ = 0;
     uint64_t last_position_ = 0;

@@ -14,8 +14,26 @@ bool ReorderWindow::is_late(const CameraStamp& stamp) const {
            time_back_ns < (id_back + double(frames_) + 0.5) * period_ns_;
 }
 
+// However late: a camera that begins anew counts ids that have come before, or at another time.
+bool ReorderWindow::fills_gap(const CameraStamp& stamp) const {
+    return std::ranges::any_of(gaps_, [&](const Gap& gap) {
+        return gap.epoch == epoch_ && stamp.frame_id > gap.before.frame_id && stamp.frame_id < gap.after.frame_id &&
+               stamp.timestamp_ns > gap.before.timestamp_ns && stamp.timestamp_ns < gap.after.timestamp_ns;
+    });
+}
+
+void ReorderWindow::note_gap(const CameraStamp& stamp) {
+    if (any_ && stamp.frame_id <= newest_.frame_id + 1) return;
+    // Before the first frame of all lies what its id leaves room for.
+    const double room_ns = double(stamp.frame_id + frames_) * period_ns_;
+    const CameraStamp first{0, stamp.timestamp_ns - std::min(stamp.timestamp_ns, uint64_t(room_ns))};
+    gaps_.push_back({epoch_, any_ ? newest_ : first, stamp});
+    if (gaps_.size() > gaps_max) gaps_.pop_front();
+}
+
 ReorderWindow::Arrival ReorderWindow::add(FrameWitness frame) {
     if (any_ && frame.stamp.frame_id <= newest_.frame_id && !is_late(frame.stamp)) {
+        if (fills_gap(frame.stamp)) return Arrival::too_late;
         ++epoch_;
         newest_ = frame.stamp;
     }
@@ -28,6 +46,7 @@ ReorderWindow::Arrival ReorderWindow::add(FrameWitness frame) {
     } else if (last_taken_ && key <= *last_taken_) {
         return Arrival::too_late;
     }
+    note_gap(frame.stamp);
     if (!any_ || frame.stamp.frame_id > newest_.frame_id) newest_ = frame.stamp;
     any_ = true;
     frame.epoch = epoch_;

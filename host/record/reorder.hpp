@@ -33,7 +33,7 @@ class ReorderWindow {
     ReorderWindow(size_t frames, double period_ns) : frames_(frames), period_ns_(period_ns) {}
 
     // Takes a frame. A count that falls back starts an epoch of its own, unless the frame's id and time both lie within
-    // the window before the newest frame's: then it is late, or a duplicate.
+    // the window before the newest frame's, or its id has not come and its time fits there: then it is late, or a duplicate.
     Arrival add(FrameWitness frame);
 
     // The next frame in camera order, once `frames` later ones have come, or whatever is left when `flush`.
@@ -47,7 +47,16 @@ class ReorderWindow {
 
   private:
     using Key = std::pair<uint32_t, uint64_t>;  // epoch, id
+    // Ids that were passed over, from behind one frame to before another.
+    struct Gap {
+        uint32_t epoch;
+        CameraStamp before, after;
+    };
+    static constexpr size_t gaps_max = 256;
+
     bool is_late(const CameraStamp& stamp) const;
+    bool fills_gap(const CameraStamp& stamp) const;
+    void note_gap(const CameraStamp& stamp);
 
     size_t frames_;
     double period_ns_;
@@ -56,6 +65,7 @@ class ReorderWindow {
     CameraStamp newest_;  // of this epoch
     std::map<Key, FrameWitness> waiting_;
     std::optional<Key> last_taken_;
+    std::deque<Gap> gaps_;
     std::deque<std::pair<Key, uint64_t>> recent_;  // key and time of the last arrivals, to know duplicates by
 };
 

@@ -25,8 +25,8 @@ SEQUENCE = ROOT / "examples/sequence_single.toml"
 HANG_S = 60  # not a measure of speed
 WIDTH, HEIGHT = 16, 8
 STAGE = f"[[camera]]\nwidth = {WIDTH}\nheight = {HEIGHT}\n"
-MAGIC = 0x32474e4952534c4f
-HEADER_BYTES, META_BYTES = 192, 56
+MAGIC = 0x33474e4952534c4f
+HEADER_BYTES, META_BYTES = 192, 64
 SLOTS, STRIDE = 8, (META_BYTES + WIDTH * HEIGHT * 2 + 63) // 64 * 64
 # Where things are in the header, and as what.
 SLOTS_AT, STRIDE_AT, WIDTH_AT, HEIGHT_AT, FORMAT_AT, CFA_AT, BITS_AT = 8, 12, 16, 20, 24, 28, 32
@@ -85,11 +85,12 @@ class Ring(threading.Thread):
         head, tail = self.get("<Q", HEAD), self.get("<Q", TAIL)
         if 0 <= head - tail < SLOTS and not self.odd.get("mute"):
             meta = {"camera": 0, "width": WIDTH, "height": HEIGHT, "format": 1, "cfa": 1, "pitch": 2 * WIDTH, "id": self.frame_id,
-                    "time": 1_000_000 + 462_960 * self.frame_id, "black": 64.0, "white": 4095.0, "bytes": 2 * WIDTH * HEIGHT}
+                    "time": 1_000_000 + 462_960 * self.frame_id, "black": 64.0, "white": 4095.0, "bytes": 2 * WIDTH * HEIGHT,
+                    "dropped": 0}
             meta |= self.odd.get("meta", {}) if is_odd else {}
             place = HEADER_BYTES + head % SLOTS * STRIDE
             if place + META_BYTES <= len(self.memory):
-                self.memory[place:place + META_BYTES] = struct.pack("<IIIIIIQQffQ", *meta.values())
+                self.memory[place:place + META_BYTES] = struct.pack("<IIIIIIQQffQQ", *meta.values())
             self.put("<Q", HEAD, head + 1)
         if not self.odd.get("clock stands"):
             self.put("<Q", WATERMARK, 1_000_000 + 462_960 * self.frame_id)

@@ -13,7 +13,30 @@ namespace {
 
 constexpr size_t room = 4, frames_max = 3;
 
-class Reading : public testing::Test {
+// A camera that tells how many it dropped only with the frame behind them, as GigE Vision's and V4L2's drivers do.
+class LateTelling : public FakeCamera {
+  public:
+    using FakeCamera::FakeCamera;
+    std::optional<Frame> read(int timeout_ms) override {
+        auto frame = FakeCamera::read(timeout_ms);
+        if (!frame) return frame;
+        if (frame->stamp.frame_id > last_id_ + 1) told_ += frame->stamp.frame_id - last_id_ - 1;
+        last_id_ = frame->stamp.frame_id;
+        return frame;
+    }
+    CameraCounts counts() const override {
+        CameraCounts counts = FakeCamera::counts();
+        counts.dropped = told_;
+        return counts;
+    }
+
+  private:
+    uint64_t last_id_ = 0;
+    std::atomic<uint64_t> told_ = 0;
+};
+
+template <typename Device>
+class ReadingFrom : public testing::Test {
   protected:
     void begin() {
         config_.width = 16, config_.height = 8;
@@ -23,9 +46,9 @@ class Reading : public testing::Test {
         options.frames_max = frames_max, options.frame_bytes = 16 * 8 * 2;
         const auto frames = *FrameRoom::create(options);
         monitor_.add_camera(0, frames);
-        reader_.emplace(camera_, config_,
-                        CameraReaderOptions{std::nullopt, frames, [this] { return disk_is_late_.load(); }}, queue_,
-                        monitor_, 0);
+        const auto waits_for_disk = [this] { return ++looks_, disk_is_late_.load(); };
+        reader_.emplace(camera_, config_, CameraReaderOptions{std::nullopt, frames, waits_for_disk}, queue_, monitor_,
+                        0);
     }
     // The next frame; pauses before it are left out.
     FrameNews next_frame() {
@@ -52,12 +75,16 @@ class Reading : public testing::Test {
     }
 
     CameraConfig config_;
-    FakeCamera camera_{options()};
+    Device camera_{options()};
     std::atomic<bool> disk_is_late_ = false;
+    std::atomic<int> looks_ = 0;  // for whether it is
     RecordMonitor monitor_;
     RecordQueue queue_{SIZE_MAX};
     std::optional<CameraReader> reader_;
 };
+
+using Reading = ReadingFrom<FakeCamera>;
+using ReadingLateTelling = ReadingFrom<LateTelling>;
 
 }  // namespace
 
@@ -92,6 +119,23 @@ TEST_F(Reading, no_more_frames_are_held_than_may_be_and_what_is_dropped_meanwhil
     const FrameNews after = next_frame();
     EXPECT_EQ(after.witness.stamp.frame_id, frames_max + room + 8);
     EXPECT_EQ(camera_.counts().missing_ids, 7u);
+}
+
+TEST_F(ReadingLateTelling, what_the_disk_held_up_is_the_disks_although_it_is_told_when_the_disk_has_long_gone_on) {
+    disk_is_late_ = true;
+    begin();
+    expose(frames_max);
+    std::vector<FrameNews> held;
+    for (size_t n = 0; n < frames_max; ++n) held.push_back(next_frame());
+    expose(room + 5);
+    while (looks_ == 0) std::this_thread::yield();
+    disk_is_late_ = false;
+    held.clear();
+    for (size_t n = 0; n < room; ++n) EXPECT_EQ(next_frame().witness.disk_drops, 0u);
+    expose(1);
+    const FrameNews after = next_frame();
+    EXPECT_EQ(after.witness.disk_drops, 5u);
+    EXPECT_EQ(after.witness.host_drops, 0u);
 }
 
 // Neither a UVC camera nor most of GigE Vision tell where they saturate or where black is.
