@@ -6,7 +6,7 @@ HOST := build/host
 CHECKED := build/checked
 SIDE_BY_SIDE := $(MAKE) --no-print-directory -j2 --output-sync=target
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix guest-test fuzz-smoke \
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test soak guest-test fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -34,7 +34,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke hil matrix-pytest guest-test ## everything that needs no hardware
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke daemon-test hil matrix-pytest guest-test ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
@@ -65,6 +65,12 @@ bench-smoke: benchmarks ## every benchmark once at tiny sizes, and the tests of 
 noise: all ## Wenger's SNR comparison on the virtual stage, and what designed bases gain: out/bench, docs/bases.md
 	@$(PYTHON) tests/bench/snr.py --out out/bench --page docs/bases.md
 	@$(PYTHON) tests/bench/basis_gain.py --out out/bench --plot docs/images/basis_gain.png --page docs/bases.md
+
+daemon-test: all ## the daemon: its API, takes, failures in each state, on the virtual stage
+	@$(PYTHON) -m pytest -q tests/daemon
+
+soak: all ## an hour and more of takes with random faults by the daemon (TAKES=n, SEED=n)
+	@SOAK_TAKES=$(or $(TAKES),1000) SOAK_SEED=$(or $(SEED),1) $(PYTHON) -m pytest -q tests/daemon/test_service.py -k random_faults
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(SIDE_BY_SIDE) hil-pytest capture-pytest

@@ -29,6 +29,16 @@ RpcOutcome invalid(const std::string& why) {
     return {nullptr, RpcError{RpcError::invalid_params, why}};
 }
 
+std::vector<std::string> texts_of(JsonObject& params, const std::string& key) {
+    const json list = params.any(key);
+    std::vector<std::string> texts;
+    if (!list.is_array() || !std::ranges::all_of(list, [](const json& one) { return one.is_string(); }))
+        params.reject(key, "is to be a list of texts");
+    else
+        for (const json& one : list) texts.push_back(one);
+    return texts;
+}
+
 TakeRequest take_request(JsonObject& params) {
     TakeRequest request;
     if (params.has("seconds")) request.seconds = params.number("seconds", 1e-3, seconds_max);
@@ -37,12 +47,18 @@ TakeRequest take_request(JsonObject& params) {
     if (params.has("notes")) request.notes = params.text("notes");
     if (params.has("fps")) request.fps = params.number("fps", 0, 100'000);
     if (params.has("quality")) request.quality = params.text("quality");
+    if (params.has("also")) request.also = texts_of(params, "also");
     if (params.has("memory_only")) request.memory_only = params.boolean("memory_only");
     const auto names = motion_quality_names();
-    if (!request.quality.empty() && std::ranges::find(names, request.quality) == names.end())
+    const auto is_quality = [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); };
+    if (!request.quality.empty() && !is_quality(request.quality))
         params.reject("quality", "is none of none, preview, standard and final");
+    for (size_t n = 0; n < request.also.size(); ++n)
+        if (!is_quality(request.also[n]) || std::ranges::count(request.also, request.also[n]) > 1)
+            params.reject("also", "is to name qualities, none, preview, standard and final, each once");
     if (!request.slate.empty())
-        if (const Status fits = check_slate(request.slate); !fits) params.reject("slate", "is none: " + fits.error().message);
+        if (const Status fits = check_slate(request.slate); !fits)
+            params.reject("slate", "is none: " + fits.error().message);
     return request;
 }
 

@@ -119,6 +119,8 @@ void Conductor::record_now(const TakeRequest& request, const Reply& reply) {
     plan_.reset();
     plan.choices.slate.take = fmt::format("{}", name->number);
     plan.choices.output = TakeFolder(stage_.daemon.takes).archive_of(*name);
+    for (const std::string& quality : wanted.also)
+        plan.choices.also.push_back(quality + "=" + TakeFolder(stage_.daemon.takes).archive_of(*name, quality));
     const auto back_to_idle = [&](const Error& why) {
         if (devices_) (void)devices_->make_dark();
         refuse(why);
@@ -138,6 +140,7 @@ void Conductor::record_now(const TakeRequest& request, const Reply& reply) {
     take->seconds_planned = plan.forecast.seconds;
     for (size_t c = 0; c < stage_.cameras.size(); ++c)
         take->target_bytes += target_bytes_max(plan.sequence, stage_, c, plan.targets, plan.choices.single_float);
+    take->target_bytes *= archives->size();
     begin_take(take);
     nlohmann::json watched = nlohmann::json::object();
     const auto report = run_planned(plan, *archives, *watch, reply, watched);
@@ -176,7 +179,8 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
                            const nlohmann::json& watched) {
     const auto take = snapshot().take;
     if (!report) {
-        const std::string why = stop_.wanted ? report.error().message + ": " + stop_.why() : report.error().message;
+        std::string why = report.error().message;
+        if (stop_.wanted && why.find(stop_.why()) == std::string::npos) why += ": " + stop_.why();
         events_.add(EventKind::take_failed, why, {{"take", take->name}});
         devices_.reset();  // as they are is not known: they are opened anew, and looked at
         next_look_ = {};

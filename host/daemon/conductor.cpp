@@ -20,6 +20,7 @@ constexpr std::chrono::milliseconds dark_patience(Patience::stop_ms + 2000);
 Conductor::Conductor(std::string config_path, StageConfig stage, EventLog& events)
     : config_path_(std::move(config_path)), events_(events), stage_(std::move(stage)) {
     now_.sequence = stage_.daemon.sequence;
+    look_at_devices();  // nobody is told that all is well before it was looked at
     thread_ = std::thread([this] { work(); });
 }
 

@@ -17,6 +17,7 @@
 #include "daemon/events.hpp"
 #include "daemon/stage_devices.hpp"
 #include "daemon/states.hpp"
+#include "daemon/stuck_watch.hpp"
 #include "daemon/take_plan.hpp"
 #include "take/card.hpp"
 #include "take/stage_watch.hpp"
@@ -59,7 +60,7 @@ struct Snapshot {
 // Functions may be called from any thread; one thing is done at a time, and what comes meanwhile is refused with what it is.
 class Conductor {
   public:
-    // `stage` was read from the file `config_path`.
+    // `stage` was read from the file `config_path`. Returns when the devices have been looked at.
     Conductor(std::string config_path, StageConfig stage, EventLog& events);
     ~Conductor();
 
@@ -122,12 +123,11 @@ class Conductor {
         bool dark = false;
         uint64_t missing = 0;  // slots, that were told
         Clock::time_point next_progress, next_missing;
-        std::map<std::string, std::pair<uint64_t, Clock::time_point>> beats;
+        StuckWatch stages;
     };
     void tell_progress(const TakeProgress& progress, Clock::time_point now);
     void tell_dark(const BoardProgress& board);
     void watch_disk(const TakeProgress& progress);
-    std::string stuck_stage(const TakeProgress& progress, Clock::time_point now, std::chrono::seconds stuck_after);
 
     const std::string config_path_;
     EventLog& events_;

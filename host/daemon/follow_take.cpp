@@ -23,7 +23,7 @@ std::string Conductor::follow(std::chrono::seconds stuck_after) {
     tell_dark(progress.record.board);
     tell_progress(progress, now);
     watch_disk(progress);
-    return stuck_stage(progress, now, stuck_after);
+    return followed_.stages.look(progress.record.stages, now, stuck_after);
 }
 
 // The state changes with the board's word, so that nobody steps to the stage by a guess.
@@ -71,17 +71,6 @@ void Conductor::watch_disk(const TakeProgress& progress) {
         EventKind::disk_full,
         fmt::format("the disk of '{}' has {} left and {} are kept: the take ends here, and what it has is finished",
                     stage.daemon.takes, bytes_words(*free), bytes_words(reserve)));
-}
-
-std::string Conductor::stuck_stage(const TakeProgress& progress, Clock::time_point now,
-                                   std::chrono::seconds stuck_after) {
-    for (const StageProgress& stage : progress.record.stages) {
-        auto& [beats, since] = followed_.beats[stage.name];
-        if (beats != stage.beats || since == Clock::time_point() || stage.activity != StageActivity::works)
-            beats = stage.beats, since = now;
-        if (now - since > stuck_after) return stage.name;
-    }
-    return "";
 }
 
 }  // namespace ols

@@ -84,8 +84,8 @@ std::string TakeName::text() const {
     return fmt::format("{}_{:03}", slate, number);
 }
 
-std::string TakeFolder::archive_of(const TakeName& name) const {
-    return (fs::path(path_) / (name.text() + suffix)).string();
+std::string TakeFolder::archive_of(const TakeName& name, const std::string& quality) const {
+    return (fs::path(path_) / (name.text() + (quality.empty() ? "" : "-" + quality) + suffix)).string();
 }
 
 Result<std::vector<std::string>> TakeFolder::names() const {

@@ -33,7 +33,8 @@ class TakeFolder {
     // of range, the folder cannot be read.
     Result<TakeName> next(const std::string& slate, std::optional<int> number) const;
 
-    std::string archive_of(const TakeName& name) const;
+    // Of the take itself, or of the same take in another quality: SLATE_NNN-QUALITY.rfa.
+    std::string archive_of(const TakeName& name, const std::string& quality = "") const;
 
     // The archive of a take by its name, as "12A_003". Errors: no such name, no such take.
     Result<std::string> find(const std::string& name) const;

@@ -82,9 +82,10 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
     plan.sequence_name = sequence_name;
     plan.choices = choices_of(request, setup);
     const double seconds = request.seconds.value_or(setup.seconds);
-    // Targets of a performance need half a cycle before and after them.
-    const double cycles =
-        std::ceil(seconds * double(tick_hz) / double(one_cycle->cycle_ticks()) - 1e-9) + (plan.choices.fps > 0 ? 1 : 0);
+    // Slots are whole ticks, so that twelve cycles may last a bit less than a second: that asks for no thirteenth. Targets of a
+    // performance need half a cycle before and after them.
+    const double played = seconds * double(tick_hz) / double(one_cycle->cycle_ticks());
+    const double cycles = std::ceil(played - 0.01) + (plan.choices.fps > 0 ? 1 : 0);
     if (!(cycles >= 1 && cycles <= cycles_max))
         return fail(fmt::format("a take lasts from one cycle to {:.0f} s, and not {} s",
                                 cycles_max * double(one_cycle->cycle_ticks()) / double(tick_hz), seconds));
@@ -104,6 +105,10 @@ Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequen
                                         uint64_t(setup.reserve_mb) * 1'000'000);
     if (!forecast) return forecast.error();
     plan.forecast = *forecast;
+    if (!request.also.empty() && plan.targets.every == 0)
+        return fail("another quality is of a performance: give its targets a second, too, as --fps 24");
+    plan.forecast.bytes_needed *= 1 + request.also.size();
+    plan.forecast.seconds_that_fit /= double(1 + request.also.size());
     return plan;
 }
 

@@ -19,6 +19,8 @@ struct TakeRequest {
     std::string slate, notes, quality;
     std::optional<int> number;
     std::optional<double> fps;
+    std::vector<std::string>
+        also;  // qualities in which a performance is developed besides, each into SLATE_NUMBER-QUALITY.rfa
     bool memory_only = false;  // nothing is spilled: what does not fit into memory is lost, and named
 };
 

@@ -200,7 +200,7 @@ class AravisCamera : public Camera {
     std::shared_ptr<Acquisition> running() const { return watch_->running; }
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
-        Frame frame;
+        Frame frame = new_frame();
         acquisition.starvation.take(acquisition.stream->unplaced());
         auto kind = acquisition.frames->read(buffer, frame);
         if (kind == AravisFrames::Kind::whole && acquisition.stream->is_disowned(buffer))

@@ -66,7 +66,7 @@ bool AravisFrames::unpack(ArvBuffer* buffer, Frame& frame) const {
     size_t size = 0;
     const auto* data = static_cast<const std::byte*>(arv_buffer_get_image_data(buffer, &size));
     const size_t row_bytes = x_padding > 0 ? packed_row_bytes(layout, frame.width) + size_t(x_padding) : 0;
-    frame.samples.resize(size_t(frame.pitch_bytes) * frame.height);
+    frame.samples.make_room(size_t(frame.pitch_bytes) * frame.height);
     const std::span<uint16_t> samples(reinterpret_cast<uint16_t*>(frame.samples.data()),
                                       size_t(frame.width) * frame.height);
     return unpack_samples({data, size}, layout, frame.width, frame.height, row_bytes, samples).ok();

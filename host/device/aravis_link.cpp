@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "device/aravis_camera.hpp"
+#include "device/library_thread.hpp"
 #include "device/usb_cameras.hpp"
 #include "steady_clock.hpp"
 
@@ -20,7 +22,6 @@ namespace {
 // Buffers: a fifth of a second and more of small frames, and never more memory than this.
 constexpr size_t buffers_bytes = size_t(256) << 20;
 constexpr size_t buffers_min = 16, buffers_max = 1024;
-constexpr int socket_bytes = 32 << 20;
 // Packets of a frame that may be asked for again, by how many it has. Most of the first frame may be lost: the library enlarges its
 // socket when that one's first packet has come.
 constexpr double asked_again = 1;
@@ -29,13 +30,9 @@ constexpr uint64_t no_frame = UINT64_MAX;  // the id of a buffer that has none
 constexpr uint32_t timestamp_control = 0x0944, timestamp_latch = 2, timestamp_high = 0x0948, timestamp_low = 0x094c;
 constexpr uint32_t control_privilege = 0x0a00;
 
-struct Found {
-    std::string id, vendor, model, serial, address, protocol;
-};
-
-std::vector<Found> list_cameras() {
+std::vector<AravisListing> list_cameras() {
     arv_update_device_list();
-    std::vector<Found> found;
+    std::vector<AravisListing> found;
     const auto text = [](const char* words) { return std::string(words ? words : ""); };
     for (unsigned n = 0; n < arv_get_n_devices(); ++n)
         found.push_back({text(arv_get_device_id(n)), text(arv_get_device_vendor(n)), text(arv_get_device_model(n)),
@@ -48,9 +45,9 @@ std::vector<Found> list_cameras() {
 Result<std::string> choose_camera(const std::string& name) {
     in_addr address{};
     if (inet_pton(AF_INET, name.c_str(), &address) == 1) return name;
-    const std::vector<Found> found = list_cameras();
+    const std::vector<AravisListing> found = list_cameras();
     std::string list;
-    for (const Found& camera : found)
+    for (const AravisListing& camera : found)
         list +=
             fmt::format("{}aravis:{} ({} {})", list.empty() ? "" : ", ", camera.serial, camera.vendor, camera.model);
     if (name.empty()) {
@@ -64,19 +61,19 @@ Result<std::string> choose_camera(const std::string& name) {
         return found[0].id;
     }
     std::vector<std::string> ids;
-    for (const Found& camera : found)
+    for (const AravisListing& camera : found)
         if (camera.serial == name || camera.id == name || camera.address == name) ids.push_back(camera.id);
     if (ids.size() > 1)
         return fail("there are several cameras of serial number " + name + ": give the whole id, " + ids[0]);
     return ids.empty() ? name : ids[0];
 }
 
-// What the kernel grants of `socket_bytes`: net.core.rmem_max bounds it.
+// What the kernel grants of `aravis_socket_bytes`: net.core.rmem_max bounds it.
 int granted_socket_bytes() {
     const int probe = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     int granted = 0;
     socklen_t size = sizeof granted;
-    setsockopt(probe, SOL_SOCKET, SO_RCVBUF, &socket_bytes, sizeof socket_bytes);
+    setsockopt(probe, SOL_SOCKET, SO_RCVBUF, &aravis_socket_bytes, sizeof aravis_socket_bytes);
     getsockopt(probe, SOL_SOCKET, SO_RCVBUF, &granted, &size);
     close(probe);
     return granted / 2;  // the kernel counts its own share, too: socket(7)
@@ -102,6 +99,11 @@ void choose_socket(ArvGvDevice* device) {
 }
 
 }  // namespace
+
+std::vector<AravisListing> list_aravis_cameras() {
+    LibraryThread calls;
+    return calls.run(list_cameras, Camera::device_patience_ms).value_or(std::vector<AravisListing>());
+}
 
 uint64_t ticks_to_ns(uint64_t ticks, uint64_t ticks_hz) {
     constexpr uint64_t second_ns = 1'000'000'000;
@@ -198,7 +200,7 @@ Result<std::unique_ptr<AravisStream>> AravisLink::make_stream(std::string& chose
     ArvStream* made = arv_device_create_stream(device_.get(), nullptr, nullptr, error.out());
     if (!made) return fail(name_ + " gives no stream of frames: " + error.message());
     auto stream = std::make_unique<AravisStream>(ObjectPointer<ArvStream>(made));
-    g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", socket_bytes,
+    g_object_set(made, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size", aravis_socket_bytes,
                  "packet-request-ratio", asked_again, nullptr);
     ArvGvStreamPacketResend resend = ARV_GV_STREAM_PACKET_RESEND_NEVER;
     g_object_get(made, "packet-resend", &resend, nullptr);

@@ -79,6 +79,21 @@ class Camera {
 
     virtual CameraCounts counts() const = 0;
     virtual CameraState state() const = 0;
+
+    // Frames that are read from now on have their samples in what is lent, where the driver makes them as they are read (new_frame());
+    // null: in memory of their own. Not during read().
+    void borrow_from(std::shared_ptr<SampleLender> lender) { lender_ = std::move(lender); }
+
+  protected:
+    // For drivers, in read(): a frame without samples, and with room for them.
+    Frame new_frame() const {
+        Frame frame;
+        if (lender_) frame.samples = lender_->lend();
+        return frame;
+    }
+
+  private:
+    std::shared_ptr<SampleLender> lender_;
 };
 
 // "aravis:SERIAL" is a GigE Vision or USB3 Vision camera, "aravis:" the only one there is (device/aravis_camera.hpp);

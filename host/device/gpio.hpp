@@ -42,6 +42,15 @@ class GpioLines {
 Result<std::unique_ptr<GpioLines>> open_gpio(const std::string& chip, const std::vector<GpioLineSetup>& inputs,
                                              const std::vector<GpioLineSetup>& outputs);
 
+// A line as it is, without taking it: nothing changes. `line` is its name on the chip, or its offset in digits.
+struct GpioLineLook {
+    std::string chip;  // "gpiochip0"
+    unsigned offset = 0;
+    bool is_used = false;
+    std::string consumer;  // who uses it; empty where the kernel does not say
+};
+Result<GpioLineLook> look_at_line(const std::string& chip, const std::string& line);
+
 // What is known of an input's edges. Edges alternate: two of one direction in a row prove one between them that did not come, and
 // so does a level that the last edge does not explain. Of an even number dropped nothing can be known.
 class EdgeAccount {

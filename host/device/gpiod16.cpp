@@ -71,6 +71,30 @@ Error no_chip(const std::string& chip, int error) {
                             there.empty() ? "; this machine shows none" : "; there are " + there));
 }
 
+std::string line_names(gpiod_chip* chip) {
+    std::string names;
+    for (unsigned n = 0; n < gpiod_chip_num_lines(chip); ++n) {
+        gpiod_line* line = gpiod_chip_get_line(chip, n);
+        if (line && gpiod_line_name(line))
+            names += (names.empty() ? ", and the names " : ", ") + quoted(gpiod_line_name(line));
+    }
+    return names;
+}
+
+std::string name_of(gpiod_chip* chip) {
+    return fmt::format("the GPIO chip '{}'", gpiod_chip_name(chip));
+}
+
+// By its name, or its offset in digits.
+Result<gpiod_line*> find_line(gpiod_chip* chip, const std::string& name) {
+    gpiod_line* line = gpiod_chip_find_line(chip, name.c_str());
+    const bool is_offset = name.size() <= 5 && name.find_first_not_of("0123456789") == std::string::npos;
+    if (!line && is_offset) line = gpiod_chip_get_line(chip, unsigned(std::stoi(name)));
+    if (line) return line;
+    return fail(fmt::format("{} has no line '{}': it has the offsets 0 to {}{}", name_of(chip), name,
+                            gpiod_chip_num_lines(chip) - 1, line_names(chip)));
+}
+
 class Gpiod16 : public GpioLines {
   public:
     Gpiod16(Chip chip, std::string name) : chip_(std::move(chip)), name_(std::move(name)) {}
@@ -79,7 +103,7 @@ class Gpiod16 : public GpioLines {
 
     Status request(const std::vector<GpioLineSetup>& inputs, const std::vector<GpioLineSetup>& outputs) {
         for (const GpioLineSetup& setup : inputs) {
-            const auto line = find(setup);
+            const auto line = find_line(chip_.get(), setup.line);
             if (!line.ok()) return line.error();
             if (gpiod_line_request_both_edges_events_flags(*line, consumer, flags_of(setup)) != 0)
                 return refused(*line, setup, "an input with edges");
@@ -87,7 +111,7 @@ class Gpiod16 : public GpioLines {
             waiting_.push_back({gpiod_line_event_get_fd(*line), POLLIN, 0});
         }
         for (const GpioLineSetup& setup : outputs) {
-            const auto line = find(setup);
+            const auto line = find_line(chip_.get(), setup.line);
             if (!line.ok()) return line.error();
             if (gpiod_line_request_output_flags(*line, consumer, flags_of(setup), 0) != 0)
                 return refused(*line, setup, "an output");
@@ -142,26 +166,6 @@ class Gpiod16 : public GpioLines {
         return edges;
     }
 
-    Result<gpiod_line*> find(const GpioLineSetup& setup) {
-        gpiod_line* line = gpiod_chip_find_line(chip_.get(), setup.line.c_str());
-        const bool is_offset =
-            setup.line.size() <= 5 && setup.line.find_first_not_of("0123456789") == std::string::npos;
-        if (!line && is_offset) line = gpiod_chip_get_line(chip_.get(), unsigned(std::stoi(setup.line)));
-        if (line) return line;
-        return fail(fmt::format("{} has no line '{}': it has the offsets 0 to {}{}", name_, setup.line,
-                                gpiod_chip_num_lines(chip_.get()) - 1, line_names()));
-    }
-
-    std::string line_names() const {
-        std::string names;
-        for (unsigned n = 0; n < gpiod_chip_num_lines(chip_.get()); ++n) {
-            gpiod_line* line = gpiod_chip_get_line(chip_.get(), n);
-            if (line && gpiod_line_name(line))
-                names += (names.empty() ? ", and the names " : ", ") + quoted(gpiod_line_name(line));
-        }
-        return names;
-    }
-
     Error refused(gpiod_line* line, const GpioLineSetup& setup, const char* what) const {
         const int error = errno;
         if (error == EBUSY)
@@ -188,10 +192,20 @@ Result<std::unique_ptr<GpioLines>> open_gpio(const std::string& chip, const std:
                                              const std::vector<GpioLineSetup>& outputs) {
     Chip opened(gpiod_chip_open_lookup(chip.c_str()), gpiod_chip_close);
     if (!opened) return no_chip(chip, errno);
-    const std::string name = fmt::format("the GPIO chip '{}'", gpiod_chip_name(opened.get()));
+    const std::string name = name_of(opened.get());
     auto lines = std::make_unique<Gpiod16>(std::move(opened), name);
     if (const Status requested = lines->request(inputs, outputs); !requested.ok()) return requested.error();
     return std::unique_ptr<GpioLines>(std::move(lines));
+}
+
+Result<GpioLineLook> look_at_line(const std::string& chip, const std::string& line) {
+    const Chip opened(gpiod_chip_open_lookup(chip.c_str()), gpiod_chip_close);
+    if (!opened) return no_chip(chip, errno);
+    const auto found = find_line(opened.get(), line);
+    if (!found.ok()) return found.error();
+    const char* const user = gpiod_line_consumer(*found);
+    return GpioLineLook{gpiod_chip_name(opened.get()), gpiod_line_offset(*found), gpiod_line_is_used(*found),
+                        user ? user : ""};
 }
 
 }  // namespace ols

@@ -331,13 +331,13 @@ uint64_t RingReader::frames_waiting() const {
     return state_->problem ? 0 : waiting;
 }
 
-std::optional<Frame> RingReader::read(int timeout_ms) {
+std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame()>& new_frame) {
     RingHeader& header = state_->mapping.header();
     const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
     while (state_->running && !state_->problem) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
         if (frames_waiting() > 0) {
-            Frame frame = take_frame();
+            Frame frame = take_frame(new_frame());
             if (state_->mapping.memory.cut()) return std::nullopt;
             return frame;
         }
@@ -348,12 +348,11 @@ std::optional<Frame> RingReader::read(int timeout_ms) {
     return std::nullopt;
 }
 
-Frame RingReader::take_frame() {
+Frame RingReader::take_frame(Frame frame) {
     const RingMapping& mapping = state_->mapping;
     const std::byte* record = mapping.record(state_->tail);
     RingFrame meta;
     std::memcpy(&meta, record, sizeof meta);
-    Frame frame;
     frame.camera = meta.camera;
     frame.stamp = {meta.frame_id, meta.timestamp_ns};
     frame.width = meta.width;

@@ -17,6 +17,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -138,7 +139,9 @@ class RingReader {
     // The next frame, copied out, or nothing when none came within `timeout_ms` (a pause for the caller to look at
     // its stop flag; nothing else is decided by it). One that is larger than the header's content, of another format, or whose
     // rows are not in its bytes comes without samples.
-    std::optional<Frame> read(int timeout_ms);
+    // `new_frame`: makes the frame that is read into.
+    std::optional<Frame> read(
+        int timeout_ms, const std::function<Frame()>& new_frame = [] { return Frame(); });
     uint64_t watermark_ns() const;
     // Frames that found no room, of those before the last one that was read; once all are read, of all.
     uint64_t dropped() const;
@@ -157,7 +160,7 @@ class RingReader {
     struct State;
     explicit RingReader(std::unique_ptr<State>);
     uint64_t frames_waiting() const;
-    Frame take_frame();
+    Frame take_frame(Frame frame);
     std::unique_ptr<State> state_;
 };
 

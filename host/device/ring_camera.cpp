@@ -42,7 +42,7 @@ class RingCamera : public Camera {
         const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
         // Stale frames do not prolong the wait, be there ever so many.
         for (auto left = std::chrono::milliseconds(timeout_ms);;) {
-            auto frame = ring_.read(int(left.count()));
+            auto frame = ring_.read(int(left.count()), [this] { return new_frame(); });
             if (!frame) return std::nullopt;
             if (delivery_.take(frame->stamp)) {
                 frame->camera = index_;

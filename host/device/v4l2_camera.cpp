@@ -192,7 +192,7 @@ class V4l2Camera : public Camera {
     Taken frame_of(const V4l2Stream::Filled& filled, V4l2Stamp stamp) {
         const bool is_end = !stamp.is_begin && made_.setup.exposure_mode == ExposureMode::timed;
         const CameraStamp ours{stamp.id, stamp.time_ns - std::min(stamp.time_ns, is_end ? exposure_ns() : 0)};
-        Frame frame;
+        Frame frame = new_frame();
         frame.camera = index_;
         frame.stamp = ours;
         frame.width = uint32_t(made_.setup.width);
@@ -201,7 +201,7 @@ class V4l2Camera : public Camera {
         frame.white = float((1 << made_.layout.bits) - 1);
         const size_t row_samples = frame.width * size_t(samples_per_pixel(frame.cfa));
         frame.pitch_bytes = uint32_t(row_samples * sizeof(uint16_t));
-        frame.samples.resize(size_t(frame.pitch_bytes) * frame.height);
+        frame.samples.make_room(size_t(frame.pitch_bytes) * frame.height);
         const std::span<uint16_t> to(reinterpret_cast<uint16_t*>(frame.samples.data()), row_samples * frame.height);
         const Status whole =
             unpack_samples(filled.content, made_.layout, row_samples, frame.height, made_.row_bytes, to);

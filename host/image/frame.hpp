@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "image/sample_buffer.hpp"
+
 namespace ols {
 
 enum class PixelFormat : uint32_t {
@@ -54,7 +56,7 @@ struct Frame {
     float black = 0;  // counts of no light; of a take's whole counts as measured or, failing that, as the stage has it
     float white = 4095;  // counts at which a sample saturates
 
-    std::vector<std::byte> samples;  // height * pitch_bytes
+    SampleBuffer samples;  // height * pitch_bytes
 
     // Where identify put it; valid only when `identified`.
     bool identified = false;

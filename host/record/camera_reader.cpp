@@ -78,7 +78,8 @@ void CameraReader::read() {
 bool CameraReader::take_place() {
     if (options_.room->take_place(std::chrono::milliseconds(0))) return true;
     const auto look = [this] {
-        if (options_.waits_for_disk && options_.waits_for_disk()) frames_behind_disk_ = backlog_max;
+        if (options_.room->waits_for_disk() || (options_.waits_for_disk && options_.waits_for_disk()))
+            frames_behind_disk_ = backlog_max;
     };
     look();
     const bool has_place = options_.room->take_place(std::chrono::milliseconds(pause_ms));
@@ -114,12 +115,7 @@ void CameraReader::enqueue(Frame frame) {
         news.witness.summary = summarize_frame(frame, frame.black, config_.noise);
         news.bits = bits_.read(frame);
     }
-    const size_t bytes = frame.samples.size();
-    options_.room->hold(bytes);
-    news.frame = std::shared_ptr<Frame>(new Frame(std::move(frame)), [room = options_.room, bytes](Frame* last) {
-        delete last;
-        room->let_go(bytes);
-    });
+    news.frame = options_.room->adopt(std::move(frame));
     monitor_.change_camera(place_, [](CameraProgress& camera) { ++camera.frames_received; });
     queue_.push(std::move(news));
 }

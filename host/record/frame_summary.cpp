@@ -12,8 +12,9 @@ namespace {
 template <typename Sample>
 double sum_row(const std::byte* row, size_t begin, size_t end) {
     const auto* samples = reinterpret_cast<const Sample*>(row);
-    // 16-bit counts add up exactly; floats in double, in order, so that every machine gets the same bits.
-    std::conditional_t<std::is_integral_v<Sample>, uint64_t, double> sum = 0;
+    // 16-bit counts add up exactly, those of a block's row in 32 bits (frames are at most 16384 pixels wide); floats in double, in order,
+    // so that every machine gets the same bits.
+    std::conditional_t<std::is_integral_v<Sample>, uint32_t, double> sum = 0;
     for (size_t x = begin; x < end; ++x) sum += samples[x];
     return double(sum);
 }

@@ -28,9 +28,12 @@ Result<uint64_t> start_unless(Camera& camera, const std::atomic<bool>& stop) {
 
 // A camera that delivers, until this goes.
 struct StartedCamera {
-    StartedCamera(Camera& started, const std::atomic<bool>& stop)
-        : camera(started), time_ns(start_unless(started, stop)) {}
-    ~StartedCamera() { camera.stop(); }
+    StartedCamera(Camera& started, const std::shared_ptr<FrameRoom>& room, const std::atomic<bool>& stop)
+        : camera((started.borrow_from(room), started)), time_ns(start_unless(started, stop)) {}
+    ~StartedCamera() {
+        camera.stop();
+        camera.borrow_from(nullptr);
+    }
     StartedCamera(const StartedCamera&) = delete;
     Camera& camera;
     const Result<uint64_t> time_ns;
@@ -40,16 +43,16 @@ struct StartedCamera {
 class CameraTake {
   public:
     CameraTake(const RecordedCamera& recorded, size_t place, const Sequence& sequence, const std::atomic<bool>& stop,
-               RecordMonitor& monitor)
+               std::shared_ptr<FrameRoom> room, RecordMonitor& monitor)
         : recorded_(recorded),
           place_(place),
           sequence_(sequence),
           stop_(stop),
           monitor_(monitor),
           beat_(monitor.stages().add(fmt::format("camera {} identification", place))),
-          room_(std::make_shared<FrameRoom>(frames_in_flight(sequence, recorded.sink.cycles_kept))),
+          room_(std::move(room)),
           counts_before_(recorded.camera.counts()),
-          started_(recorded.camera, stop) {
+          started_(recorded.camera, room_, stop) {
         monitor.add_camera(recorded.index, room_);
     }
     ~CameraTake() {
@@ -114,6 +117,15 @@ class CameraTake {
     std::thread thread_;
 };
 
+Result<std::shared_ptr<FrameRoom>> room_of(const RecordedCamera& recorded, const Sequence& sequence,
+                                           const StageConfig& stage) {
+    if (recorded.sink.room) return recorded.sink.room;
+    FrameRoom::Options options;
+    options.frames_max = frames_in_flight(sequence);
+    options.frame_bytes = frame_bytes(stage.cameras[recorded.index]);
+    return FrameRoom::create(options);
+}
+
 }  // namespace
 
 Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
@@ -146,6 +158,10 @@ Status start_board(Board& board, const Sequence& sequence, const StageConfig& st
     return start_armed_board(board);
 }
 
+size_t frame_bytes(const CameraConfig& camera) {
+    return size_t(camera.width) * size_t(camera.height) * size_t(samples_per_pixel(camera.cfa)) * sizeof(uint16_t);
+}
+
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {
     return (3 + cycles_kept) * sequence.slots.size() + 4 * identify_options(sequence).reorder_frames;
 }
@@ -160,7 +176,9 @@ Result<RecordReport> record_take(Board& board, const std::vector<RecordedCamera>
             return status.error();
     std::deque<CameraTake> takes;
     for (const RecordedCamera& recorded : cameras) {
-        takes.emplace_back(recorded, takes.size(), sequence, stop.wanted, *monitor);
+        auto room = room_of(recorded, sequence, stage);
+        if (!room.ok()) return room.error();
+        takes.emplace_back(recorded, takes.size(), sequence, stop.wanted, std::move(*room), *monitor);
         if (!takes.back().time_ns().ok()) return takes.back().time_ns().error();
     }
     if (stop.wanted) return fail("stopped before the take began");

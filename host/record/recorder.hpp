@@ -19,15 +19,17 @@
 
 namespace ols {
 
-// One camera's share of a take. Called from that camera's thread. A sink that takes long holds up its camera, in the end: at most
-// frames_in_flight() frames are kept.
+// One camera's share of a take. Called from that camera's thread. A sink that keeps frames for long holds up its camera, in the end:
+// when they have no more room.
 struct RecordSink {
     // An identified frame; `tick` and the other fields of identification are set. The frame's memory is counted against
     // the bound until the last owner lets go of it.
     std::function<void(std::shared_ptr<const Frame>)> frame;
     std::function<void(const MissingSlot&)> missing;
     std::function<void(uint64_t decided, uint64_t total)> progress;  // every trigger below `decided` has had its call
-    size_t cycles_kept = 0;  // whose frames the sink holds besides the one being developed and the one being gathered
+    // For the frames, until the last owner lets go of them; null: as many as frames_in_flight(). Samples may be on a disk when a frame
+    // is handed on (FrameRoom::bring_back()).
+    std::shared_ptr<FrameRoom> room = {};
     // Whether what holds frames waits for a disk, for the cause of those that are dropped meanwhile; from any thread.
     std::function<bool()> waits_for_disk = {};
 };
@@ -67,9 +69,12 @@ struct RecordReport {
     }
 };
 
-// A camera's frames that may be in memory at once: three cycles (one being developed, one gathered, one waiting for its proof),
-// those that the sink keeps besides, and two reorder windows.
+// A camera's frames that must have room at once: three cycles (one being developed, one gathered, one waiting for its proof),
+// `cycles_kept` that developing holds besides, and two reorder windows.
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
+
+// Of a frame's samples, 16 bits each.
+size_t frame_bytes(const CameraConfig& camera);
 
 // Loads and arms the sequence as its playback says. The error is the board's own, or says what a latched fault was.
 Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage);

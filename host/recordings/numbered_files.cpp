@@ -227,7 +227,7 @@ class PictureDecoder {
     const double last_count_, full_scale_;
 };
 
-Frame frame_of(const Kind& kind, std::vector<std::byte> samples) {
+Frame frame_of(const Kind& kind, const std::vector<std::byte>& samples) {
     Frame frame;
     frame.width = kind.width, frame.height = kind.height;
     frame.format = kind.format;
@@ -235,7 +235,7 @@ Frame frame_of(const Kind& kind, std::vector<std::byte> samples) {
     frame.pitch_bytes = uint32_t(samples.size() / kind.height);
     if (kind.black) frame.black = float(*kind.black);
     if (kind.white) frame.white = float(*kind.white);
-    frame.samples = std::move(samples);
+    frame.samples.assign(samples.data(), samples.data() + samples.size());
     return frame;
 }
 

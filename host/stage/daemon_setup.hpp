@@ -10,6 +10,8 @@ namespace ols {
 class TomlSection;
 
 struct DaemonSetup {
+    bool is_there = false;  // the stage has [daemon]
+
     // Where it listens.
     std::string socket = "/run/stagectl/control.sock";
     std::string socket_group;  // that may use the socket beside its owner; empty: the daemon's own group

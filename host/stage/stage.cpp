@@ -170,6 +170,7 @@ Result<StageConfig> read_stage(const std::string& path) {
     stage.gpio = read_gpio(file->section("gpio"));
     if (file->has("telemetry")) stage.telemetry = read_telemetry(file->section("telemetry"), stage.chain_bits);
     stage.daemon = read_daemon(file->section("daemon"));
+    stage.daemon.is_there = file->has("daemon");
     file->read("calibration", stage.calibration_dir);
     if (!stage.calibration_dir.empty()) stage.calibration_dir = file->resolve_path(stage.calibration_dir);
     if (file->has("camera")) {

@@ -18,6 +18,9 @@ void TakeParams::add_to(CLI::App& verb, bool with_slate) {
         ->check(CLI::NonNegativeNumber);
     verb.add_option("--quality", quality, "motion compensation of a performance; otherwise as configured")
         ->check(CLI::IsMember(motion_quality_names()));
+    verb.add_option("--also", also,
+                    "a performance in another quality, too, as SLATE_NUMBER-QUALITY; may be given several times")
+        ->check(CLI::IsMember(motion_quality_names()));
     verb.add_flag("--memory-only", memory_only, "spill no frames to a disk, whatever is configured");
     if (!with_slate) return;
     verb.add_option("--slate", slate, "the take is SLATE_NUMBER; otherwise as configured");
@@ -31,6 +34,7 @@ nlohmann::json TakeParams::to_json() const {
     if (seconds) params["seconds"] = *seconds;
     if (fps) params["fps"] = *fps;
     if (!quality.empty()) params["quality"] = quality;
+    if (!also.empty()) params["also"] = also;
     if (memory_only) params["memory_only"] = true;
     if (!slate.empty()) params["slate"] = slate;
     if (number) params["number"] = *number;

@@ -23,6 +23,7 @@ struct TakeParams {
     std::optional<double> seconds, fps;
     std::optional<int> number;
     std::string slate, notes, quality;
+    std::vector<std::string> also;
     bool memory_only = false;
 
     void add_to(CLI::App& verb, bool with_slate);

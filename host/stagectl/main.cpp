@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
     app.name("stagectl");
     app.footer(
         "Example: stagectl sequence examples/sequence_s159.toml\nExit codes: 0 done; 1 an error, named; 2 a take that "
-        "is not complete; else wrong arguments.");
+        "is not complete, or a warning of doctor; else wrong arguments.");
     app.require_subcommand(1);
     int exit_code = 0;
     ols::add_serve_verb(app, exit_code);
@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
     ols::add_grey_verb(app, exit_code);
     ols::add_calibrate_verb(app, exit_code);
     ols::add_ingest_verb(app, exit_code);
+    ols::add_doctor_verb(app, exit_code);
     ols::add_flash_verb(app, exit_code);
     return ols::run_program(app, argc, argv, exit_code);
 }

@@ -16,6 +16,8 @@ struct Options {
     LinkOptions links;
     TakeOptions take;
     int cycles = 0;
+    uint64_t memory_mb = 0, spill_mb = 0;
+    std::string spill;
     std::optional<bool> arm;  // whether to wait for the button; otherwise where there is one
 };
 
@@ -25,6 +27,10 @@ Status check_account(const Options& options) {
     return check_outputs({.inputs = {options.take.sequence.path, options.take.sequence.basis, options.links.stage_path,
                                      options.take.calibration},
                           .streams = {options.take.frames}});
+}
+
+TakeMemory memory_of(const Options& options) {
+    return {options.memory_mb << 20, options.spill, options.spill_mb << 20};
 }
 
 // Of --arm and --no-arm, or else of the stage.
@@ -66,6 +72,7 @@ Result<int> run(const Options& options) {
 
     TakeDescription take{*sequence, *stage, *calibration, masks_of(options.take)};
     take.witness_step = options.take.witness_step;
+    take.memory = memory_of(options);
     std::optional<LineFile> account;
     nlohmann::json watched;  // of the recording
     TakeSinks sinks = sinks_of(*planned, options.take, account, "recording");
@@ -102,6 +109,16 @@ void add_run_verb(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(1, 1'000'000));
     options->links.add_to(*verb, true);
     options->take.add_to(*verb);
+    verb->add_option("--memory-mb", options->memory_mb,
+                     "memory for frames that are not developed yet, all of it taken before the take begins; otherwise "
+                     "as much as "
+                     "developing must hold at once")
+        ->check(CLI::Range(1, 1 << 24));
+    verb->add_option("--spill", options->spill,
+                     "folder on a fast disk for frames that the memory does not hold; they are gone with the take");
+    verb->add_option("--spill-mb", options->spill_mb, "there, at most; otherwise as much as the disk has")
+        ->needs("--spill")
+        ->check(CLI::Range(1, 1 << 26));
     verb->add_flag("--arm,!--no-arm", options->arm,
                    "wait for the arm button, or not; otherwise where the stage has one ([gpio.arm])");
     verb->callback([options, &exit_code] { exit_code = report_errors([&] { return run(*options); }); });

@@ -77,6 +77,7 @@ void print_report(const TakeReport& report, bool is_estimate, const std::vector<
     if (!options.json)
         fmt::print("{} of {} slots missing; {:.1f} s\n", missing, record.slots_total * record.cameras.size(),
                    report.seconds_total);
+    if (!report.memory.problem.empty()) fmt::print(stderr, "stagectl: {}\n", report.memory.problem);
     if (!record.board_end.empty())
         fmt::print(stderr, "stagectl: {} ({})\n", record.board_end.text, cause_words(record.board_end.cause));
     for (const CameraReport& camera : record.cameras)
@@ -108,6 +109,7 @@ Result<int> finish_take(const TakeReport& report, bool is_estimate, const std::v
     // The take is finished first, whatever became of its account.
     if (account)
         if (const Status told = account->finish(); !told.ok()) return told.error();
+    if (!report.memory.problem.empty()) return 1;
     int missing = 0;
     for (const OutputReport& output : report.outputs) {
         if (!output.write_error.empty()) return 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The verbs of stagectl. Each adds its subcommand; its callback does the work and returns through `exit_code`: 0 done,
-// 1 an error that was printed, 2 a take that was recorded and is not complete.
+// 1 an error that was printed, 2 a take that was recorded and is not complete, or a warning of doctor.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -27,6 +27,7 @@ void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_grey_verb(CLI::App& app, int& exit_code);
 void add_ingest_verb(CLI::App& app, int& exit_code);
 void add_swap_verb(CLI::App& app, int& exit_code);
+void add_doctor_verb(CLI::App& app, int& exit_code);
 void add_flash_verb(CLI::App& app, int& exit_code);
 
 }  // namespace ols

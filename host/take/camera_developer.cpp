@@ -20,6 +20,25 @@ bool has_no_frame(const TargetFrames& frames) {
     return frames.frames.empty() && frames.tracking.empty() && frames.matte.empty();
 }
 
+void add_there(std::vector<std::shared_ptr<const Frame>*>& all, std::shared_ptr<const Frame>& frame) {
+    if (frame) all.push_back(&frame);
+}
+std::vector<std::shared_ptr<const Frame>*> frames_of(CycleFrames& frames) {
+    std::vector<std::shared_ptr<const Frame>*> all;
+    for (auto& frame : frames.slots) add_there(all, frame);
+    for (auto& of_slot : frames.neighbours)
+        for (auto& frame : of_slot) add_there(all, frame);
+    return all;
+}
+std::vector<std::shared_ptr<const Frame>*> frames_of(TargetFrames& frames) {
+    std::vector<std::shared_ptr<const Frame>*> all;
+    for (auto& frame : frames.frames) add_there(all, frame);
+    for (auto& frame : frames.across) add_there(all, frame);
+    for (auto& one : frames.tracking) add_there(all, one.frame);
+    for (auto& one : frames.matte) add_there(all, one.frame);
+    return all;
+}
+
 // The pixels with a mask bit; raises `worst` to their share.
 int64_t count(MaskBit bit, const Target& target, double& worst) {
     const auto& mask = target.mask;
@@ -31,7 +50,7 @@ int64_t count(MaskBit bit, const Target& target, double& worst) {
 }  // namespace
 
 CameraDeveloper::CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera,
-                                 TargetWriter& writer, OutputMonitor& monitor)
+                                 TargetWriter& writer, OutputMonitor& monitor, std::shared_ptr<FrameRoom> room)
     : take_(take),
       camera_(camera),
       is_performance_(targets.every > 0),
@@ -45,6 +64,8 @@ CameraDeveloper::CameraDeveloper(const TakeDescription& take, const TakeTargets&
       plan_(plan_targets(take.sequence, take.masks, targets)),
       store_(take.sequence),
       missing_(take.sequence),
+      room_(std::move(room)),
+      work_(room_ ? SIZE_MAX : 1),
       thread_([this] { develop(); }) {}
 
 void CameraDeveloper::add_frame(std::shared_ptr<const Frame> frame) {
@@ -123,11 +144,36 @@ void CameraDeveloper::develop() {
     beat.beat(StageActivity::ended);
 }
 
-TargetOutcome CameraDeveloper::develop(const Job& job) {
+// Puts copies in memory in the place of frames that are on a disk.
+Status CameraDeveloper::bring_back(Job& job) {
+    const std::vector<std::shared_ptr<const Frame>*> frames =
+        std::visit([](auto& of_target) { return frames_of(of_target); }, job.frames);
+    std::erase_if(brought_back_, [&](const auto& known) {
+        return std::ranges::none_of(frames, [&](const auto* frame) { return *frame == known.first; });
+    });
+    for (std::shared_ptr<const Frame>* frame : frames) {
+        const auto known = brought_back_.find(*frame);
+        if (known != brought_back_.end()) {
+            *frame = known->second;
+            continue;
+        }
+        auto brought = room_->bring_back(*frame);
+        if (!brought.ok()) return brought.error();
+        if (*brought == *frame) continue;
+        brought_back_.emplace(*frame, *brought);
+        *frame = std::move(*brought);
+    }
+    return Done{};
+}
+
+TargetOutcome CameraDeveloper::develop(Job& job) {
     TargetOutcome outcome{camera_, job.index, nullptr, "", {}};
     outcome.detail = std::visit([&](const auto& frames) { return provenance_of(frames, take_); }, job.frames);
-    auto target = guarded("cannot develop it",
-                          [&] { return std::visit([&](const auto& frames) { return develop(frames); }, job.frames); });
+    auto target = guarded("cannot develop it", [&]() -> Result<Target> {
+        if (room_)
+            if (const Status there = bring_back(job); !there.ok()) return there.error();
+        return std::visit([&](const auto& frames) { return develop(frames); }, job.frames);
+    });
     if (!target.ok()) {
         outcome.why = target.error().message;
         if (!job.lost_by.empty()) outcome.why += "; the first was lost because: " + job.lost_by.text;

@@ -2,12 +2,14 @@
 // Camera developer: gathers the identified frames of one camera and develops the targets of one output, in a thread of its own.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <thread>
 #include <variant>
 
 #include "develop/frame_store.hpp"
 #include "record/event_queue.hpp"
+#include "record/frame_room.hpp"
 #include "record/missing_ranges.hpp"
 #include "take/take.hpp"
 #include "take/target_plan.hpp"
@@ -26,8 +28,10 @@ class CameraDeveloper {
     };
 
     // `camera`: its place among the stage's. References must outlive the developer.
+    // `room`: where the frames are that are to be developed, and bound how many targets wait; null: they are in memory, and one target
+    // waits.
     CameraDeveloper(const TakeDescription& take, const TakeTargets& targets, uint32_t camera, TargetWriter& writer,
-                    OutputMonitor& monitor);
+                    OutputMonitor& monitor, std::shared_ptr<FrameRoom> room);
     ~CameraDeveloper() { (void)finish(); }
 
     size_t target_count() const { return plan_.size(); }
@@ -53,8 +57,9 @@ class CameraDeveloper {
     Job gather(size_t index) const;
     void lose(size_t first, size_t last, const Reason& lost_by);
     void flush_lost();
+    Status bring_back(Job& job);
     void develop();
-    TargetOutcome develop(const Job& job);
+    TargetOutcome develop(Job& job);
     Result<Target> develop(const CycleFrames& frames) { return developer_.develop(frames); }
     Result<Target> develop(const TargetFrames& frames) { return motion_developer_.develop(frames); }
     void describe(Target& target, nlohmann::json& detail);
@@ -73,7 +78,10 @@ class CameraDeveloper {
     size_t next_ = 0;                  // of the plan
     std::optional<LostTargets> lost_;  // the run that the next target may belong to
     Report report_;                    // the thread's until it has ended
-    EventQueue<std::variant<Job, LostTargets>> work_{1};
+    const std::shared_ptr<FrameRoom> room_;
+    // Of the last target's frames, those that were on a disk, and their copies in memory: the next target may have the same.
+    std::map<std::shared_ptr<const Frame>, std::shared_ptr<const Frame>> brought_back_;
+    EventQueue<std::variant<Job, LostTargets>> work_;
     std::thread thread_;
 };
 

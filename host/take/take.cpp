@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "take/camera_developer.hpp"
+#include "take/frame_rooms.hpp"
 #include "take/provenance.hpp"
 #include "take/target_writer.hpp"
 
@@ -19,32 +20,24 @@ namespace ols {
 
 namespace {
 
-// Cycles whose frames developing holds besides the one being developed and the one being gathered (RecordSink): those of the
-// output that needs most, since all hold the same frames.
-size_t cycles_kept(const TakeMasks& masks, const std::vector<TakeOutput>& outputs) {
-    const bool has_performance =
-        std::ranges::any_of(outputs, [](const TakeOutput& output) { return output.targets.every > 0; });
-    if (has_performance) return 3;
-    return masks.fill_from_neighbours ? 2 : 0;
-}
-
 // An archive that is being made of the recording: each camera's frames are developed beside the others', and one writes.
 class Output {
   public:
-    Output(const TakeDescription& take, const TakeOutput& output, TakeMonitor& monitor)
-        : archive_(output.archive),
+    Output(const TakeDescription& take, const TakeOutput& output, const FrameRooms& rooms, TakeMonitor& monitor)
+        : sink_(output.sink),
           targets_(output.targets),
           monitor_(monitor.add_output(take.stage.cameras.size(), take.sequence.slots.front().period_ticks)),
-          writer_(output.archive, monitor_) {
+          writer_(*sink_, monitor_) {
         for (uint32_t camera = 0; camera < take.stage.cameras.size(); ++camera) {
-            developers_.emplace_back(take, targets_, camera, writer_, monitor_);
+            developers_.emplace_back(take, targets_, camera, writer_, monitor_,
+                                     rooms.of_camera.empty() ? nullptr : rooms.of_camera[camera]);
             monitor_.plan(developers_.back().target_count());
         }
     }
 
     Status begin() {
         for (uint32_t camera = 0; camera < developers_.size(); ++camera)
-            if (const Status expected = archive_.expect_targets(camera, uint32_t(developers_[camera].target_count()));
+            if (const Status expected = sink_->expect_targets(camera, uint32_t(developers_[camera].target_count()));
                 !expected.ok())
                 return expected;
         return Done{};
@@ -85,13 +78,13 @@ class Output {
             missing.push_back(developer.missing_json());
             suspicion.add(developer.finish().suspicion);
         }
-        archive_.add_to_manifest(describe_take(take, targets_, origin, record, missing, suspicion));
-        archive_.add_to_manifest(account);
-        return archive_.finish();
+        sink_->add_to_manifest(describe_take(take, targets_, origin, record, missing, suspicion));
+        sink_->add_to_manifest(account);
+        return sink_->finish();
     }
 
   private:
-    ArchiveWriter& archive_;
+    const std::shared_ptr<TargetSink> sink_;
     const TakeTargets targets_;
     OutputMonitor& monitor_;
     TargetWriter writer_;
@@ -99,7 +92,7 @@ class Output {
 };
 
 // What one camera's frames become, in every output.
-RecordSink sink_of(size_t camera, const std::vector<std::unique_ptr<Output>>& outputs, size_t kept,
+RecordSink sink_of(size_t camera, const std::vector<std::unique_ptr<Output>>& outputs, const FrameRooms& rooms,
                    std::function<void(const Frame&)> identified,
                    std::function<void(uint64_t decided, uint64_t total)> progress) {
     return {[=, &outputs](const std::shared_ptr<const Frame>& frame) {
@@ -113,7 +106,7 @@ RecordSink sink_of(size_t camera, const std::vector<std::unique_ptr<Output>>& ou
                 for (const auto& output : outputs) output->developer(camera).hand_on(decided);
                 progress(decided, total);
             },
-            kept,
+            rooms.of_camera.empty() ? nullptr : rooms.of_camera[camera],
             [&outputs] {
                 return std::ranges::any_of(outputs, [](const auto& output) { return output->waits_for_disk(); });
             }};
@@ -163,11 +156,12 @@ namespace {
 // `record_into` records into the cameras' sinks, from whatever the take comes.
 template <typename Record>
 Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::json& origin, const TakeSinks& sinks,
-                                TakeMonitor& monitor, const Record& record_into) {
+                                TakeMonitor& monitor, const FrameRooms& rooms, const Record& record_into) {
     const size_t cameras = take.stage.cameras.size();
     const auto start = std::chrono::steady_clock::now();
     std::vector<std::unique_ptr<Output>> outputs;
-    for (const TakeOutput& output : sinks.outputs) outputs.push_back(std::make_unique<Output>(take, output, monitor));
+    for (const TakeOutput& output : sinks.outputs)
+        outputs.push_back(std::make_unique<Output>(take, output, rooms, monitor));
     for (const auto& output : outputs)
         if (const auto begun = output->begin(); !begun) return begun.error();
 
@@ -187,15 +181,17 @@ Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::jso
             decided[camera] = done;
             sinks.progress(*std::ranges::min_element(decided), total);
         };
-        camera_sinks.push_back(sink_of(camera, outputs, cycles_kept(take.masks, sinks.outputs), identified, progress));
+        camera_sinks.push_back(sink_of(camera, outputs, rooms, identified, progress));
     }
     TakeReport report;
     const Result<RecordReport> record = record_into(camera_sinks);
-    const auto account = sinks.account ? sinks.account() : nlohmann::json::object();
+    auto account = sinks.account ? sinks.account() : nlohmann::json::object();
     for (const auto& output : outputs) report.outputs.push_back(output->wait());
     if (!record.ok()) return record.error();
     if (!has_frame) return nothing_came(*record);
     report.record = *record;
+    report.memory = rooms.report();
+    if (!report.memory.problem.empty()) account["memory"] = {{"problem", report.memory.problem}};
     for (size_t n = 0; n < outputs.size(); ++n) {
         const Status finished = outputs[n]->finish(take, origin, *record, account);
         if (!finished.ok() && report.outputs[n].write_error.empty())
@@ -217,7 +213,9 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
                         take.stage.cameras.size(), cameras));
     TakeMonitor own_monitor;
     TakeMonitor& monitor = sinks.monitor ? *sinks.monitor : own_monitor;
-    return develop_take(take, origin_of(devices.board), sinks, monitor,
+    const auto rooms = make_frame_rooms(take, sinks.outputs);
+    if (!rooms.ok()) return rooms.error();
+    return develop_take(take, origin_of(devices.board), sinks, monitor, *rooms,
                         [&](const std::vector<RecordSink>& camera_sinks) {
                             std::vector<RecordedCamera> recorded;
                             for (size_t camera = 0; camera < cameras; ++camera)
@@ -232,7 +230,8 @@ Result<TakeReport> ingest_take(const TakeDescription& take, const RecordedFrames
                                const TakeSinks& sinks, const std::atomic<bool>& stop) {
     TakeMonitor own_monitor;
     return develop_take(take, origin_of(frames, place, take.sequence), sinks,
-                        sinks.monitor ? *sinks.monitor : own_monitor, [&](const std::vector<RecordSink>& camera_sinks) {
+                        sinks.monitor ? *sinks.monitor : own_monitor, {},
+                        [&](const std::vector<RecordSink>& camera_sinks) {
                             return record_files(frames, place, take.sequence, take.stage.cameras[0],
                                                 measured_black(take.calibration, 0), camera_sinks[0], stop);
                         });

@@ -16,6 +16,7 @@
 #include "record/take_memory.hpp"
 #include "stage/calibration.hpp"
 #include "take/take_monitor.hpp"
+#include "take/target_sink.hpp"
 
 namespace ols {
 
@@ -55,15 +56,21 @@ struct TakeDevices {
 // One archive that is made of the recording.
 struct TakeOutput {
     // Its info gives slate, lights and units; what the take adds (identification, calibration, program) goes to the manifest.
-    // It takes its place with the first frame that has its slot, so that a start that fails touches no earlier archive.
-    ArchiveWriter& archive;
+    // It takes its place with the first frame that has its slot, so that a start that fails touches no earlier archive. It must
+    // outlive the take.
+    TakeOutput(ArchiveWriter& archive, TakeTargets which)
+        : sink(std::make_shared<ArchiveSink>(archive)), targets(which) {}
+    TakeOutput(std::shared_ptr<TargetSink> any, TakeTargets which) : sink(std::move(any)), targets(which) {}
+
+    std::shared_ptr<TargetSink> sink;
     TakeTargets targets;
 };
 
 // Where it goes.
 struct TakeSinks {
-    std::vector<TakeOutput> outputs;                                 // one recording may be developed in several ways
-    std::function<void(const Frame&)> identified;                    // every frame that has its slot; one at a time
+    std::vector<TakeOutput> outputs;  // one recording may be developed in several ways
+    // Every frame that has its slot, one at a time. Its samples may be on a disk.
+    std::function<void(const Frame&)> identified;
     std::function<void(uint64_t decided, uint64_t total)> progress;  // of triggers
     // Of what else watched the stage, for the manifest: asked once it is recorded.
     std::function<nlohmann::json()> account = {};
@@ -96,17 +103,26 @@ struct OutputReport {
     SuspicionReport suspicion;
 };
 
+// What became of the room for frames.
+struct MemoryReport {
+    uint64_t frames_spilled = 0;
+    std::string
+        problem;  // why the disk took no more, or gave other samples back, and what to do; empty while all was well
+};
+
 struct TakeReport {
     RecordReport record;
     std::vector<OutputReport> outputs;  // in their order
+    MemoryReport memory;
     double seconds_total = 0;
 };
 
 // Threads: the board's; for each camera one that reads, one that identifies, and for each output one that develops; and for each
-// output one that writes. Each hands on one thing at a time, and developing runs on all processors; memory is bounded by
-// frames_in_flight() frames a camera and two targets an output and camera. A performance whose targets take longer than they last holds up the camera in the end (RecordSink).
+// output one that writes. Developing runs on all processors, and follows as fast as it can, while identification goes on: frames that
+// wait are in take.memory, and a camera that finds no more room there drops them, which is counted. Besides, memory holds two targets
+// an output and camera.
 // Every target that was to come is in the archive's journal at the end, finished or missing with its reason.
-// Errors: the stage's cameras were not all given; a camera or the board cannot be started; not one frame came. Then there
+// Errors: the stage's cameras were not all given; the memory is not to be had; a camera or the board cannot be started; not one frame came. Then there
 // is no archive. Anything later is in the report and in the archive.
 Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devices, const TakeSinks& sinks,
                             const StopRequest& stop);

@@ -41,9 +41,9 @@ void TargetWriter::count_missing(uint32_t targets) {
 Status TargetWriter::write(const TargetOutcome& outcome) {
     if (!outcome.target) {
         count_missing(1);
-        return archive_.note_missing_target(outcome.camera, outcome.index, outcome.why, outcome.detail);
+        return sink_.note_missing_target(outcome.camera, outcome.index, outcome.why, outcome.detail);
     }
-    const Status written = archive_.write_target(*outcome.target);
+    const Status written = sink_.write_target(*outcome.target);
     if (written.ok()) {
         ++report_.written;
         monitor_.write();
@@ -51,13 +51,13 @@ Status TargetWriter::write(const TargetOutcome& outcome) {
     }
     count_missing(1);
     // That it is noted, or will be, is for the archive; what the user must hear of first is the disk.
-    (void)archive_.note_missing_target(outcome.camera, outcome.index, written.error().message, outcome.detail);
+    (void)sink_.note_missing_target(outcome.camera, outcome.index, written.error().message, outcome.detail);
     return fail(fmt::format("target {}: {}", outcome.index, written.error().message));
 }
 
 Status TargetWriter::write(const LostTargets& run) {
     count_missing(run.last - run.first + 1);
-    return archive_.note_missing_targets(run.camera, run.first, run.last, run.why);
+    return sink_.note_missing_targets(run.camera, run.first, run.last, run.why);
 }
 
 }  // namespace ols

@@ -8,9 +8,9 @@
 #include <thread>
 #include <variant>
 
-#include "archive/archive.hpp"
 #include "record/event_queue.hpp"
 #include "take/take_monitor.hpp"
+#include "take/target_sink.hpp"
 
 namespace ols {
 
@@ -36,8 +36,8 @@ class TargetWriter {
         std::string error;  // what could not be written first, and why
     };
 
-    TargetWriter(ArchiveWriter& archive, OutputMonitor& monitor)
-        : archive_(archive), monitor_(monitor), thread_([this] { write(); }) {}
+    TargetWriter(TargetSink& sink, OutputMonitor& monitor)
+        : sink_(sink), monitor_(monitor), thread_([this] { write(); }) {}
     ~TargetWriter() { (void)finish(); }
 
     // Each waits while the one before the last is written. Outcomes of one camera come in order.
@@ -62,11 +62,11 @@ class TargetWriter {
     }
     void write();
     void count_missing(uint32_t targets);
-    Status write(TakePlace) { return archive_.take_place(); }
+    Status write(TakePlace) { return sink_.take_place(); }
     Status write(const TargetOutcome& outcome);
     Status write(const LostTargets& run);
 
-    ArchiveWriter& archive_;
+    TargetSink& sink_;
     OutputMonitor& monitor_;
     Report report_;  // the thread's until it has ended
     EventQueue<Work> work_{1};

@@ -70,6 +70,11 @@ class PlayedCamera : public Camera {
     PlayedCamera(const Sequence& sequence, const CameraConfig& camera) : PlayedCamera(sequence, camera, Options()) {}
     ~PlayedCamera() override { end(); }
 
+    uint64_t exposed() const { return exposed_; }
+    bool is_full() const {
+        const std::lock_guard lock(mutex_);
+        return waiting_.size() >= options_.room;
+    }
     // The board's clock: what has been exposed.
     uint64_t ticks() const {
         return exposed_ == 0 ? 0 : PlayedBoard::first_rise_ticks + (exposed_ - 1) * period_ticks() + period_ticks() / 2;
@@ -137,7 +142,7 @@ class PlayedCamera : public Camera {
         changed_.notify_all();
     }
     Frame picture(uint64_t trigger) {
-        Frame frame;
+        Frame frame = new_frame();
         frame.stamp = {trigger + 1, clock_begin_ns + (PlayedBoard::first_rise_ticks + trigger * period_ticks()) * 8};
         frame.width = uint32_t(info_.setup.width), frame.height = uint32_t(info_.setup.height);
         frame.cfa = info_.setup.cfa;
@@ -168,10 +173,10 @@ struct PlayedTake {
           model([this] { return camera.ticks(); }, description.sequence.slots.front().period_ticks),
           board(std::move(*Board::connect(model.connect()))) {}
 
-    // Into `archives`, one target a cycle.
-    Result<TakeReport> run(std::vector<ArchiveWriter*> archives, TakeMonitor* monitor = nullptr) {
-        TakeSinks sinks{{}, identified, progress};
-        for (ArchiveWriter* archive : archives) sinks.outputs.push_back({*archive, {}});
+    // One target a cycle, into an archive or another sink.
+    template <typename Sink>
+    Result<TakeReport> run(Sink& sink, TakeMonitor* monitor = nullptr) {
+        TakeSinks sinks{{{sink, {}}}, identified, progress};
         sinks.monitor = monitor;
         camera.play(model);
         auto report = run_take(description, {board, {&camera}}, sinks, stop);

@@ -42,7 +42,9 @@ class ReadingFrom : public testing::Test {
         config_.width = 16, config_.height = 8;
         ASSERT_TRUE(camera_.set_up(config_).ok());
         ASSERT_TRUE(camera_.start().ok());
-        const auto frames = std::make_shared<FrameRoom>(frames_max);
+        FrameRoom::Options options;
+        options.frames_max = frames_max, options.frame_bytes = 16 * 8 * 2;
+        const auto frames = *FrameRoom::create(options);
         monitor_.add_camera(0, frames);
         const auto waits_for_disk = [this] { return ++looks_, disk_is_late_.load(); };
         reader_.emplace(camera_, config_, CameraReaderOptions{std::nullopt, frames, waits_for_disk}, queue_, monitor_,

@@ -50,7 +50,7 @@ class MonitoredTake : public TakeDirectory {
   protected:
     Result<TakeReport> run(PlayedTake& take) {
         auto archive = ArchiveWriter::create(path, take_info(156));
-        return take.run({&*archive}, &monitor);
+        return take.run(*archive, &monitor);
     }
     TakeMonitor monitor;
 };

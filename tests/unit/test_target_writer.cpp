@@ -51,7 +51,8 @@ int record_take_onto(const std::string& path, uint32_t targets, bool disk_fills_
     {
         StageBeats beats;
         OutputMonitor monitor(beats, 0, 1, 57'870);
-        TargetWriter writer(*archive, monitor);
+        ArchiveSink sink(*archive);
+        TargetWriter writer(sink, monitor);
         for (uint32_t index = 0; index < targets; ++index) {
             TargetOutcome outcome{0, index, nullptr, "", {{"cycle", index}, {"padding", std::string(3000, 'p')}}};
             outcome.target =
@@ -94,7 +95,8 @@ TEST_F(SmallDisks, runs_of_targets_that_were_never_recorded_are_one_line_and_one
     ASSERT_TRUE(archive->expect_targets(0, 1'000'000).ok());
     StageBeats beats;
     OutputMonitor monitor(beats, 0, 1, 57'870);
-    TargetWriter writer(*archive, monitor);
+    ArchiveSink sink(*archive);
+    TargetWriter writer(sink, monitor);
     writer.add(TargetOutcome{0, 0, std::make_unique<Target>(numbered_target(1, 8, 8, Cfa::none, 0)), "", {}});
     writer.add(LostTargets{0, 1, 999'999, "no frame of it was recorded: the take was stopped"});
     const auto report = writer.finish();

@@ -126,7 +126,7 @@ class Demo:
         moving.animate(films, self.out / "moving.gif")
         moving.sequence(films, self.out / "moving.jpg")
         figures = moving.compare(self.out)
-        figures["moving_slots_missing"] = take["slots_missing"]
+        figures["moving_slots_missing"] = take["slots_missing_total"]
         return figures
 
     def compare(self):

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import noise
 from PIL import Image, ImageDraw, ImageFont
-from session import BIN, VirtualStage, run, run_json
+from session import BIN, Daemon, VirtualStage, run
 
 SCENE = "tools/stagesim/scenes/motion_demo.toml"
 STAGE = "tools/demo/stage_moving.toml"
 BASIS, FPS = "s159", 24
-CYCLES = 6  # half a second: the head turns from one side to the other, speaks a syllable and blinks
+# With the half cycle that targets need before and after them, half a second: the head turns from one side to the other, speaks a
+# syllable and blinks.
+SECONDS = 5 / 12
+SLATE = "moving"
 QUALITIES = ["none", "standard"]  # of motion compensation
 SHUTTER_DEG = 180
 # Of .cache/assets/env. Where a few lamps give most of the light, what moved between their slots shows; even light hides it.
@@ -24,18 +27,19 @@ SHOWN = 5  # pictures of a film in the sequence
 
 
 def record(clock, out):
-    """One recording, developed in each quality. Gives stagectl's report."""
+    """One recording by the daemon, developed in each quality. Gives its report."""
     first, *others = QUALITIES[::-1]
+    settings = f'sequence = "{BASIS}"\nnominal = true\nestimate = "clipped"\nproduction = "demo"\nslate = "{SLATE}"'
     with clock("record the moving head, every frame rendered: minutes"):
-        with VirtualStage(SCENE, STAGE, out / "stage/moving") as stage:
-            return run_json(
-                BIN / "stagectl", "run", "--basis", BASIS, "--cycles", CYCLES, "--fps", FPS, "--quality", first, "--stage", STAGE,
-                *stage.devices(), "--nominal", "--estimate", "clipped", "--production", "demo", "--scene", "moving head",
-                "-o", archive(out, first), *[word for one in others for word in ("--also", f"{one}={archive(out, one)}")], "--json")
+        with VirtualStage(SCENE, STAGE, out / "stage/moving") as stage, Daemon(STAGE, stage.work, out, settings) as daemon:
+            take = daemon("record", "--seconds", SECONDS, "--fps", FPS, "--quality", first,
+                          *[word for one in others for word in ("--also", one)])
+            daemon("preview", "-o", out / "moving_preview.png")
+            return take
 
 
 def archive(out, quality):
-    return out / f"moving_{quality}.rfa"
+    return out / f"{SLATE}_001{'' if quality == QUALITIES[-1] else f'-{quality}'}.rfa"
 
 
 def film(clock, out, environment):
@@ -47,11 +51,11 @@ def film(clock, out, environment):
     relit = [*light, "--target", "all"]
     with clock("relight the moving head"):
         for quality in QUALITIES:
-            run(BIN / "rf", "relight", out / f"moving_{quality}.rfa", *relit, "-o", folder / f"{quality}.exr", "--png", folder / f"{quality}.png")
-        run(BIN / "rf", "relight", out / "moving_standard.rfa", *relit, "--shutter", SHUTTER_DEG, "-o", folder / "blurred.exr",
+            run(BIN / "rf", "relight", archive(out, quality), *relit, "-o", folder / f"{quality}.exr", "--png", folder / f"{quality}.png")
+        run(BIN / "rf", "relight", archive(out, "standard"), *relit, "--shutter", SHUTTER_DEG, "-o", folder / "blurred.exr",
             "--png", folder / "blurred.png")
     with clock("render the truth of the moving head"):
-        for n, at_us in enumerate(moments_us(out / "moving_standard.rfa")):
+        for n, at_us in enumerate(moments_us(archive(out, "standard"))):
             run(BIN / "stagesim", "render", SCENE, "--stage", STAGE, *light, "--at-us", at_us, "--unit", "counts",
                 "-o", folder / f"truth_{n:06d}.exr", "--png", folder / f"truth_{n:06d}.png", "--png-gain", 1 / counts_per_us())
     return {name: sorted(folder.glob(f"{name}_*.png")) for name in LABELS}

@@ -107,5 +107,35 @@ class VirtualStage:
         return ["--board", f"socket:{self.work}/board.sock", "--camera", f"ring:{self.work}/cam0.ring"]
 
 
+class Daemon:
+    """`stagectl serve` for the virtual stage at `work`, until the `with` block ends. `settings`: lines of [daemon]."""
+
+    def __init__(self, stage, work, takes, settings):
+        self.work, self.socket = Path(work), Path(work) / "control.sock"
+        links = f'[board]\nlink = "socket:{self.work}/board.sock"\n'
+        daemon = f'[daemon]\nsocket = "{self.socket}"\ntakes = "{takes}"\n{settings}\n'
+        camera = f'[[camera]]\nsource = "ring:{self.work}/cam0.ring"'
+        self.config = self.work / "daemon.toml"
+        self.config.write_text(links + daemon + Path(stage).read_text().replace("[[camera]]", camera))
+
+    def __enter__(self):
+        log = self.work / "daemon.log"
+        with open(log, "w") as lines:
+            self.process = subprocess.Popen([BIN / "stagectl", "serve", "--config", self.config], cwd=ROOT, stdout=lines, stderr=lines)
+        atexit.register(self.__exit__)
+        while subprocess.run([BIN / "stagectl", "status", "--socket", self.socket], capture_output=True).returncode != 0:
+            if self.process.poll() is not None:
+                sys.exit(f"demo: the daemon ended early; it said:\n{log.read_text()}")
+            time.sleep(0.05)
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait()
+
+    def __call__(self, verb, *words):
+        return run_json(BIN / "stagectl", verb, "--socket", self.socket, *words, "--json")
+
+
 def use_root():
     os.chdir(ROOT)

@@ -24,6 +24,7 @@ UPSTREAM = {
     "archive": {"image", "stage"},
     "photographs": {"image", "stage", "archive"},
     "device": {"image", "stage"},
+    "doctor": {"image", "stage", "device"},
     "record": {"image", "stage", "device"},
     "recordings": {"image", "stage", "record", "photographs"},
     "flow": {"image"},
@@ -33,7 +34,7 @@ UPSTREAM = {
     "relight": {"image", "stage"},
     "daemon": {"image", "stage", "archive", "device", "record", "take", "relight"},
     "ingest": {"image", "stage", "photographs", "record", "recordings", "take", "stagectl"},
-    "stagectl": {"image", "stage", "archive", "device", "record", "develop", "take", "daemon"},
+    "stagectl": {"image", "stage", "archive", "device", "doctor", "record", "develop", "take", "daemon"},
 }
 # Which rooms of host/ a program of tools/ may include.
 TOOLS_MAY_INCLUDE = {"rf": {"image", "stage", "archive", "relight"}, "stagesim": {"image", "stage", "flow", "relight"}}

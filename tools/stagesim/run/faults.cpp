@@ -77,7 +77,7 @@ void FaultyDelivery::dim(std::vector<double>& lit_us, uint64_t trigger) {
 
 void FaultyDelivery::send(Frame frame, uint64_t trigger, const std::function<void(Frame)>& deliver) {
     if (strikes(FaultKind::drop_frame, trigger)) return;
-    const std::vector<std::byte> fresh = frame.samples;
+    const SampleBuffer fresh = frame.samples;
     if (strikes(FaultKind::freeze, trigger) && last_samples_.size() == fresh.size()) frame.samples = last_samples_;
     if (!faults_.empty()) last_samples_ = fresh;
     if (strikes(FaultKind::wrong_size, trigger)) {

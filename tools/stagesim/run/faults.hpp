@@ -71,7 +71,7 @@ class FaultyDelivery {
     std::deque<Held> held_;
     std::deque<std::vector<double>> lit_before_;  // of the last triggers, the latest in front
     std::map<uint64_t, Frame> waiting_;           // for the picture of another trigger
-    std::vector<std::byte> last_samples_;
+    SampleBuffer last_samples_;
 };
 
 }  // namespace ols

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Verdicts taken together, and figures and commands as text.
+#include "doctor/finding.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+
+namespace ols {
+
+Finding skipped(Check check, std::string why, std::string subject) {
+    return {check, std::move(subject), CheckVerdict::skipped, std::move(why), "", {}};
+}
+
+size_t count_of(const Findings& findings, CheckVerdict verdict) {
+    return size_t(std::ranges::count(findings, verdict, &Finding::verdict));
+}
+
+int exit_code_of(const Findings& findings) {
+    if (count_of(findings, CheckVerdict::fail) > 0) return 1;
+    return count_of(findings, CheckVerdict::warn) > 0 ? 2 : 0;
+}
+
+std::string bytes_text(double bytes) {
+    constexpr const char* units[] = {"bytes", "kB", "MB", "GB", "TB"};
+    size_t unit = 0;
+    while (bytes >= 999.5 && unit + 1 < std::size(units)) {
+        bytes /= 1000;
+        ++unit;
+    }
+    return unit == 0 || bytes >= 99.95 ? fmt::format("{:.0f} {}", bytes, units[unit])
+                                       : fmt::format("{:.3g} {}", bytes, units[unit]);
+}
+
+std::string write_file_command(const std::string& path, const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) {
+        assert(line.find('\'') == std::string::npos && line.find('%') == std::string::npos);
+        text += line + "\\n";
+    }
+    return fmt::format("printf '{}' | sudo tee {}", text, path);
+}
+
+}  // namespace ols
