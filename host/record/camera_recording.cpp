@@ -12,8 +12,9 @@ namespace {
 // camera's word; a camera that lives says by its watermark when it has delivered everything, and one whose program has
 // ended is known at once.
 constexpr int silent_looks_max = Camera::device_patience_ms / CameraReader::pause_ms;
-// After the board's end a camera that lives is behind by what its driver keeps: some tens of frames. One that is not at its end
-// after so long, by the wall's clock, never will be; nor is it waited for as long when the user has stopped the take.
+// After the board's end a camera that lives is behind by what its driver keeps, or by what it still renders: its frames are bounded by
+// their number. One that gives none for so long, by the wall's clock, never comes to its end; and when the user has stopped the take
+// it is not waited for as long, whatever it gives.
 constexpr std::chrono::seconds ending_patience(300), stopped_patience(10);
 // Frames from behind the last trigger by which those before it have come, be some of them late.
 constexpr size_t late_frames_max = 2 * IdentifyOptions{}.reorder_frames;
@@ -70,7 +71,9 @@ void CameraRecording::take(FrameNews news) {
     const uint64_t timestamp_ns = news.witness.stamp.timestamp_ns;
     frames_[news.witness.arrival] = std::move(news.frame);
     identifier_.add_frame(std::move(news.witness));
-    if (log_ended_) finish_if_beyond(timestamp_ns);
+    if (!log_ended_) return;
+    if (!stop_) log_end_ = Clock::now();  // it goes on: patience begins anew
+    finish_if_beyond(timestamp_ns);
 }
 
 // A duplicate has the same stamp, too, and is the reorder window's to find. Of two frames with the same bits the one that came

@@ -102,8 +102,8 @@ LiveStage::LiveStage(const Sequence& sequence, const StageConfig& stage, const s
     const RingLayout layout = reinterpret_cast<const RingHeader*>(memory_)->layout;
     for (size_t n = 0; n < cycle.size(); ++n) {
         const Frame& frame = cycle[n];
-        const RingFrame head{0, frame.width, frame.height, frame.format, frame.cfa,           frame.pitch_bytes,
-                             0, 0,           frame.black,  frame.white,  frame.samples.size()};
+        const RingFrame head{0, frame.width, frame.height, frame.format,         frame.cfa, frame.pitch_bytes, 0,
+                             0, frame.black, frame.white,  frame.samples.size(), 0};
         std::byte* const record = memory_ + sizeof(RingHeader) + n * layout.stride;
         std::memcpy(record, &head, sizeof head);
         std::memcpy(record + sizeof head, frame.samples.data(), frame.samples.size());
