@@ -74,18 +74,15 @@ void Conductor::work() {
     devices_.reset();
 }
 
-Conductor::Outcome Conductor::run(const std::string& what, std::function<void(const Reply&)> job) {
+std::future<Conductor::Outcome> Conductor::begin_job(const std::string& what, std::function<void(const Reply&)> job) {
     const auto reply = std::make_shared<std::promise<Outcome>>();
-    auto replied = reply->get_future();
-    {
-        const std::lock_guard lock(mutex_);
-        if (ends_) return fail("the daemon is ending");
-        if (job_) return fail(fmt::format("the stage is busy: {} is under way; try again when it is over", job_name_));
-        stop_.reset();
-        job_name_ = what;
-        job_ = [job = std::move(job), reply] { job(reply); };
-        changed_.notify_all();
-    }
+    job_name_ = what;
+    job_ = [job = std::move(job), reply] { job(reply); };
+    changed_.notify_all();
+    return reply->get_future();
+}
+
+Conductor::Outcome Conductor::reply_of(std::future<Outcome> replied, const std::string& what) {
     try {
         return replied.get();
     } catch (const std::future_error&) {  // the job ended without a reply: an exception, which is told as a fault
@@ -93,11 +90,31 @@ Conductor::Outcome Conductor::run(const std::string& what, std::function<void(co
     }
 }
 
-void Conductor::change_state(DaemonState state, const std::string& text) {
+Conductor::Outcome Conductor::run(const std::string& method, const std::string& what,
+                                  std::function<void(const Reply&)> job) {
+    const auto allowed_job = [this, method = find_method(method), job = std::move(job)](const Reply& reply) {
+        const DaemonState state = snapshot().state;
+        if (method->is_allowed(state)) return job(reply);
+        reply->set_value(fail(fmt::format("{} is for the states {}, and the stage has come into state {}", method->name,
+                                          state_words(method->allowed), ols::state_name(state))));
+    };
+    std::future<Outcome> replied;
+    {
+        const std::lock_guard lock(mutex_);
+        if (ends_) return fail("the daemon is ending");
+        if (job_) return fail(fmt::format("the stage is busy: {} is under way; try again when it is over", job_name_));
+        stop_.reset();
+        replied = begin_job(what, allowed_job);
+    }
+    return reply_of(std::move(replied), what);
+}
+
+void Conductor::change_state(DaemonState state, const std::string& text, std::optional<DaemonState> from) {
     DaemonState before;
     {
         const std::lock_guard lock(mutex_);
         before = now_.state;
+        if (from && before != *from) return;
         now_.state = state;
         if (state != DaemonState::fault) now_.fault.clear(), now_.fault_is_latched = false;
         if (state == DaemonState::idle || state == DaemonState::fault) {
@@ -158,22 +175,22 @@ void Conductor::look_at_devices() {
 }
 
 Conductor::Outcome Conductor::arm(const TakeRequest& request) {
-    return run("arming", [this, request](const Reply& reply) {
+    return run("arm", "arming", [this, request](const Reply& reply) {
         const Status armed = arm_now(request);
         reply->set_value(armed ? Outcome(plan_->to_json()) : Outcome(armed.error()));
     });
 }
 
 Conductor::Outcome Conductor::record(const TakeRequest& request) {
-    return run("a take", [this, request](const Reply& reply) { record_now(request, reply); });
+    return run("record", "a take", [this, request](const Reply& reply) { record_now(request, reply); });
 }
 
 Conductor::Outcome Conductor::calibrate(const CardOptions& card) {
-    return run("a calibration", [this, card](const Reply& reply) { calibrate_now(card, reply); });
+    return run("calibrate", "a calibration", [this, card](const Reply& reply) { calibrate_now(card, reply); });
 }
 
 Conductor::Outcome Conductor::swap(const std::string& sequence_name) {
-    return run("a swap of sequences", [this, sequence_name](const Reply& reply) {
+    return run("swap", "a swap of sequences", [this, sequence_name](const Reply& reply) {
         TakeRequest request = plan_ ? plan_->request : TakeRequest{};
         if (const auto fits = plan_take(request, sequence_name, stage_); !fits) return reply->set_value(fits.error());
         {
@@ -189,7 +206,7 @@ Conductor::Outcome Conductor::swap(const std::string& sequence_name) {
 }
 
 Conductor::Outcome Conductor::clear_fault() {
-    return run("the end of a fault", [this](const Reply& reply) {
+    return run("clear_fault", "the end of a fault", [this](const Reply& reply) {
         if (snapshot().state != DaemonState::fault) return reply->set_value(nlohmann::json{{"state", "idle"}});
         devices_.reset();
         Status there = hold_devices();
@@ -209,7 +226,7 @@ Conductor::Outcome Conductor::clear_fault() {
 }
 
 Conductor::Outcome Conductor::reload() {
-    return run("a reading of the configuration", [this](const Reply& reply) {
+    return run("reload", "a reading of the configuration", [this](const Reply& reply) {
         auto read = read_stage(config_path_);
         Status fits = Done{};
         if (read) fits = check_words(read->daemon, *read);
@@ -233,26 +250,28 @@ Conductor::Outcome Conductor::reload() {
     });
 }
 
-// The board is the running take's: it is told through it. Without one it is this thread's to tell.
+// The board is the running take's: it is told through it, and its word is in the take's account. What else is under way is cut short
+// (arming, a look at a board that hangs), and then the board is told and asked by this thread.
 Conductor::Outcome Conductor::stop(const std::string& by) {
     events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
     const auto asked = Clock::now();
     std::unique_lock lock(mutex_);
-    if (!job_) {
-        lock.unlock();
-        return run("a stop", [this, by](const Reply& reply) { reply->set_value(darken(by)); });
-    }
-    stop_.ask("stopped by " + by);
-    // Over when the board says that it is dark, or when there is no more that could be lit: the job has ended.
-    const auto is_dark = [&] {
-        return !job_ || now_.state == DaemonState::processing ||
-               (now_.take && now_.take->monitor.progress().record.board.dark_confirmed_ns != 0);
+    const auto has_dark_take = [&] {
+        return now_.take && now_.take->monitor.progress().record.board.dark_confirmed_ns != 0;
     };
-    while (!is_dark() && Clock::now() - asked < dark_patience) changed_.wait_for(lock, std::chrono::milliseconds(2));
+    while (job_ && !has_dark_take() && Clock::now() - asked < dark_patience) {
+        stop_.ask("stopped by " + by);
+        changed_.wait_for(lock, std::chrono::milliseconds(2));
+    }
     const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked).count();
-    const bool dark = is_dark() && now_.state != DaemonState::fault;
+    if (has_dark_take()) return nlohmann::json{{"dark", true}, {"after_ms", after_ms}};
+    if (!job_ && !ends_) {
+        stop_.ask("stopped by " + by);
+        auto replied = begin_job("a stop", [this, by](const Reply& reply) { reply->set_value(darken(by)); });
+        lock.unlock();
+        return reply_of(std::move(replied), "a stop");
+    }
     lock.unlock();
-    if (dark) return nlohmann::json{{"dark", true}, {"after_ms", after_ms}};
     const std::string why =
         fmt::format("the board did not confirm within {:.0f} ms that it is dark: use the emergency stop", after_ms);
     events_.add(EventKind::not_dark, why);

@@ -96,8 +96,12 @@ class Conductor {
     using Outcome = Result<nlohmann::json>;
     using Reply = std::shared_ptr<std::promise<Outcome>>;
 
-    // Runs `job` in the thread, and returns what it replies, which may be before it ends.
-    Outcome run(const std::string& what, std::function<void(const Reply&)> job);
+    // Runs `job` in the thread, and returns what it replies, which may be before it ends. Refused while another is under way, and where
+    // the state does not allow `method` when its turn comes.
+    Outcome run(const std::string& method, const std::string& what, std::function<void(const Reply&)> job);
+    // The two halves of that. `lock` is held, and nothing is under way.
+    std::future<Outcome> begin_job(const std::string& what, std::function<void(const Reply&)> job);
+    static Outcome reply_of(std::future<Outcome> replied, const std::string& what);
     void work();
     void look_at_devices();
     Status hold_devices();
@@ -112,7 +116,8 @@ class Conductor {
     void calibrate_now(CardOptions card, const Reply& reply);
     Outcome darken(const std::string& by);
 
-    void change_state(DaemonState state, const std::string& text = "");
+    // Only from the state `from`, where one is given.
+    void change_state(DaemonState state, const std::string& text = "", std::optional<DaemonState> from = {});
     void enter_fault(const std::string& why, bool is_latched);
     void begin_take(std::shared_ptr<RunningTake> take);
     void say_notes(const std::vector<std::string>& notes);

@@ -36,11 +36,7 @@ void Conductor::tell_dark(const BoardProgress& board) {
                     ? fmt::format("the board says that it is dark, {:.1f} ms after it was told", after_ms)
                     : "the board says that it is dark: it has played to the end",
                 board.stop_told_ns ? nlohmann::json{{"after_ms", after_ms}} : nlohmann::json::object());
-    {
-        const std::lock_guard lock(mutex_);
-        if (now_.state != DaemonState::recording || now_.take != followed_.take) return;
-    }
-    change_state(DaemonState::processing);
+    change_state(DaemonState::processing, "", DaemonState::recording);
 }
 
 void Conductor::tell_progress(const TakeProgress& progress, Clock::time_point now) {

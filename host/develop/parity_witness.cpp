@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 
 #include "develop/parity_sums.hpp"
 #include "develop/row_hypotheses.hpp"
@@ -69,16 +70,24 @@ ParityWitness::ParityWitness(const Basis& basis) : basis_(basis), checks_(parity
         for (int row = 0; row < basis.rows; ++row) inverse_(image, row) = basis.inverse(row, image);
 }
 
-double ParityWitness::change(const ParitySamples& samples, int row, int last_row) const {
-    double squares = 0, count = 0;
+// Sample by sample, as they lie in memory, all rows of a sample at once.
+std::vector<double> ParityWitness::changes(const ParitySamples& samples, const std::vector<int>& last_row_of) const {
+    const size_t rows = last_row_of.size();
+    std::vector<double> squares(rows);
+    double count = 0;
     for (Eigen::Index k = 0; k < last_.cols(); ++k) {
         const double variance = double(samples.variance()(k));
         if (variance <= 0) continue;
-        const double difference = double(samples.counts()(row, k)) - double(last_(last_row, k));
-        squares += difference * difference / (2 * variance);
+        const float* const now = samples.counts().col(k).data();
+        const float* const last = last_.col(k).data();
+        for (size_t row = 0; row < rows; ++row) {
+            const double difference = double(now[row]) - double(last[last_row_of[row]]);
+            squares[row] += difference * difference / (2 * variance);
+        }
         ++count;
     }
-    return squares / count;
+    for (double& sum : squares) sum /= count;
+    return squares;
 }
 
 // Mean squared difference of each row from the last target's, in units of two rows' noise: 1 but for what the subject, the lamps and
@@ -86,12 +95,12 @@ double ParityWitness::change(const ParitySamples& samples, int row, int last_row
 std::optional<RowFinding> ParityWitness::find_changed(const ParitySamples& samples,
                                                       const std::vector<int>& lost_rows) const {
     if (last_.cols() != samples.counts().cols()) return {};
-    std::vector<double> changes(size_t(basis_.rows), NAN), known;
-    for (int row = 0; row < basis_.rows; ++row) {
-        if (std::ranges::binary_search(lost_rows, row)) continue;
-        const double own = change(samples, row, row);
-        if (std::isfinite(own)) known.push_back(changes[size_t(row)] = own);
-    }
+    std::vector<int> rows(size_t(basis_.rows));
+    std::iota(rows.begin(), rows.end(), 0);
+    std::vector<double> changes = this->changes(samples, rows), known;
+    for (const int row : lost_rows) changes[size_t(row)] = NAN;
+    for (const double own : changes)
+        if (std::isfinite(own)) known.push_back(own);
     if (known.size() < 3) return {};
     const double middle = median(known), count = double((samples.variance() > 0).count());
     for (double& value : known) value = std::abs(value - middle);
@@ -105,7 +114,9 @@ std::optional<RowFinding> ParityWitness::find_changed(const ParitySamples& sampl
             changed.push_back(row), most = std::max(most, far);
     if (changed.size() == 1) return RowFinding{RowFault::changed, {{changed[0]}}, -1, most, 1};
     if (changed.size() != 2) return {};  // none, or a subject that moved, or light that did
-    const double crossed = std::max(change(samples, changed[0], changed[1]), change(samples, changed[1], changed[0]));
+    std::swap(rows[size_t(changed[0])], rows[size_t(changed[1])]);
+    const std::vector<double> exchanged = this->changes(samples, rows);
+    const double crossed = std::max(exchanged[size_t(changed[0])], exchanged[size_t(changed[1])]);
     if ((crossed - middle) / spread < least) return RowFinding{RowFault::swapped, {changed}, -1, most, 1};
     return RowFinding{RowFault::changed, {{changed[0]}, {changed[1]}}, -1, most, 1};
 }
@@ -121,6 +132,10 @@ void ParityWitness::remember(const ParitySamples& samples, const std::vector<int
     suspect_ = suspect;
     if (last_.cols() != samples.counts().cols())
         last_ = Eigen::MatrixXf::Constant(samples.counts().rows(), samples.counts().cols(), NAN);
+    if (kept.empty()) {
+        last_ = samples.counts();
+        return;
+    }
     for (int row = 0; row < basis_.rows; ++row)
         if (std::ranges::find(kept, row) == kept.end()) last_.row(row) = samples.counts().row(row);
 }

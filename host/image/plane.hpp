@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "image/freed_planes.hpp"
+
 namespace ols {
 
 // Begins on a cache line, so that what is written in whole lines streams past the cache (the inversion of 156 lamps takes four
@@ -15,14 +17,15 @@ namespace ols {
 template <typename T>
 struct PlaneAllocator {
     using value_type = T;
-    static constexpr std::align_val_t alignment{64};
-
     PlaneAllocator() = default;
     template <typename U>
     PlaneAllocator(const PlaneAllocator<U>&) {}
 
-    T* allocate(size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
-    void deallocate(T* p, size_t) { ::operator delete(p, alignment); }
+    T* allocate(size_t n) {
+        if (n > size_t(-1) / sizeof(T)) throw std::bad_alloc();
+        return static_cast<T*>(take_plane(n * sizeof(T)));
+    }
+    void deallocate(T* p, size_t n) { give_back_plane(p, n * sizeof(T)); }
     template <typename U>
     void construct(U* p) {
         ::new (static_cast<void*>(p)) U;
