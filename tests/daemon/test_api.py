@@ -199,7 +199,7 @@ def test_a_line_without_an_end_and_a_slow_request_do_not_hold_it(daemon):
         one.sendall(b"POST /rpc HTTP/1.1\r\nHost: 127.0.0.1\r\nX-")
     assert daemon.state() == "idle"  # over the Unix socket
     # Their time is over after ten seconds, however they trickle, and others have their turn.
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 120
     while daemon.curl("/metrics", "-m", "2")[0] != 200:
         for one in slow:
             try:
@@ -223,7 +223,7 @@ def test_a_subscriber_that_reads_nothing_is_let_go_of_and_others_notice_nothing(
             daemon.run("arm"), daemon.run("stop")
         armed = [reader.until_event("armed") for _ in range(3)]
         assert len(armed) == 3
-    until(lambda: daemon.events("client_dropped"), 30)
+    until(lambda: daemon.events("client_dropped"))
     mute.close()
 
 

@@ -36,19 +36,19 @@ def test_systemd_is_told_that_it_is_ready_its_state_and_that_it_lives(alone, tmp
     daemon.end()
     systemd = Systemd(tmp_path / "notify")
     daemon.start(NOTIFY_SOCKET=str(tmp_path / "notify"))
-    said = systemd.listen(2)
-    assert said.index("READY=1") < len(said) and said.count("WATCHDOG=1") > 5 and "STATUS=idle" in said
+    until(lambda: systemd.listen(0.1).count("WATCHDOG=1") > 5)
+    assert "READY=1" in systemd.said and "STATUS=idle" in systemd.said
     daemon.run("record", "--seconds", "60", "--no-wait")
     systemd.said.clear()
-    said = systemd.listen(2)
-    assert any(line.startswith("STATUS=recording: untitled_001") for line in said) and "WATCHDOG=1" in said
+    until(lambda: any(line.startswith("STATUS=recording: untitled_001") for line in systemd.listen(0.1)))
+    until(lambda: "WATCHDOG=1" in systemd.listen(0.1))
     os.kill(daemon.process.pid, signal.SIGSTOP)
     systemd.listen(0.5), systemd.said.clear()
     assert systemd.listen(1) == []
     os.kill(daemon.process.pid, signal.SIGCONT)
     daemon.process.send_signal(signal.SIGTERM)
     systemd.said.clear()
-    until(lambda: "STOPPING=1" in systemd.listen(0.2), 20)
+    until(lambda: "STOPPING=1" in systemd.listen(0.1))
     daemon.process.wait(60)
     assert daemon.process.returncode == 0
 
