@@ -49,7 +49,7 @@ def first_take():
 
 def test_a_first_take_of_operating_runs_as_printed(tmp_path):
     done = subprocess.run(
-        ["bash", "-u", "-c", first_take()], cwd=clone(tmp_path), capture_output=True, text=True, timeout=1800
+        ["bash", "-u", "-c", first_take()], cwd=clone(tmp_path), capture_output=True, text=True, timeout=600
     )
     said = done.stdout + done.stderr
     shoot = tmp_path / "out/shoot"
