@@ -136,7 +136,7 @@ class AravisCamera : public Camera {
     CameraCounts counts() const override {
         CameraCounts counts = delivery_.counts();
         counts.dropped = dropped_;
-        counts.underrun = underrun_;
+        counts.underrun = underrun_ + incomplete_;
         return counts;
     }
 
@@ -205,7 +205,7 @@ class AravisCamera : public Camera {
         auto kind = acquisition.frames->read(buffer, frame);
         if (kind == AravisFrames::Kind::whole && acquisition.stream->is_disowned(buffer))
             kind = AravisFrames::Kind::incomplete;
-        underrun_ += kind == AravisFrames::Kind::incomplete;
+        incomplete_ += kind == AravisFrames::Kind::incomplete;
         if (kind != AravisFrames::Kind::whole) return std::nullopt;
         const uint64_t missing = delivery_.counts().missing_ids;
         if (!delivery_.take(frame.stamp)) return std::nullopt;
@@ -215,10 +215,15 @@ class AravisCamera : public Camera {
         return frame;
     }
 
-    // Ids that were passed over while packets found no buffer.
+    // Ids that were passed over while packets found no buffer, be it for some of their packets only; other frames that came incomplete
+    // are the link's.
     void count_dropped(BufferStarvation& starvation, int64_t gap) {
         const bool is_starved = starvation.explains_gap();
-        if (is_starved && gap > 0) dropped_ += uint64_t(gap);
+        const uint64_t incomplete = incomplete_.exchange(0);
+        if (is_starved && gap > 0)
+            dropped_ += uint64_t(gap);
+        else
+            underrun_ += incomplete;
     }
 
     std::optional<Error> why_gone() const {
@@ -250,6 +255,7 @@ class AravisCamera : public Camera {
     AravisSetup setup_;
     std::string chosen_;
     std::atomic<uint64_t> stops_ = 0, dropped_ = 0, underrun_ = 0;
+    std::atomic<uint64_t> incomplete_ = 0;  // since the last whole frame: whose they are shows with the next
     DeliveryCount delivery_;
 };
 
