@@ -130,6 +130,7 @@ def test_a_calibration_is_measured_and_in_force(alone):
     daemon = alone('nominal = false\nsequence = "single"')
     assert "camera 0 is not calibrated" in daemon.run("record", code=1)
     daemon.stage.end()
+    daemon.until_state("fault")
     daemon.stage.scene = "card.toml"
     daemon.stage.start()
     daemon.until_state("idle")
