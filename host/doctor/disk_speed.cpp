@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// O_TMPFILE where the file system has it (open(2)); elsewhere a file whose name is taken away at once.
+// Writing, syncing and reading back a nameless file.
 #include "doctor/disk_speed.hpp"
 
 #include <fcntl.h>
@@ -15,6 +15,7 @@
 #include <cstring>
 #include <memory>
 
+#include "image/nameless_file.hpp"
 #include "steady_clock.hpp"
 
 namespace ols {
@@ -55,15 +56,6 @@ Piece make_piece() {
 
 Error cannot(const char* what, const std::string& folder) {
     return fail(fmt::format("{} in '{}': {}", what, folder, std::strerror(errno)));
-}
-
-int nameless_file(const std::string& folder) {
-    const int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != EINVAL)) return fd;
-    std::string path = folder + "/.stagectl-doctor-XXXXXX";
-    const int named = ::mkostemp(path.data(), O_CLOEXEC);
-    if (named >= 0) ::unlink(path.c_str());
-    return named;
 }
 
 // Each piece says which it is, so that no two are alike.
@@ -131,7 +123,7 @@ Result<DiskSpeed> measure_disk(const std::string& folder, const DiskSpeedOptions
     const uint64_t bytes = std::min(options.bytes_max, room->free_bytes / 10) / piece_bytes * piece_bytes;
     if (bytes < std::min(least_bytes, options.bytes_max))
         return fail(fmt::format("too little room in '{}' to measure its disk", folder));
-    const Descriptor file(nameless_file(folder));
+    const Descriptor file(open_nameless_file(folder));
     if (file.fd < 0) return cannot("cannot make a file", folder);
     const Piece piece = make_piece();
     DiskSpeed speed;

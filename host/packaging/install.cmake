@@ -17,7 +17,7 @@ configure_file(${SOURCE}/stagectl.service.in ${BUILT}/stagectl.service @ONLY)
 file(INSTALL ${BUILT}/stagectl.service DESTINATION ${prefix}/lib/systemd/system)
 file(INSTALL ${SOURCE}/stagectl.sysusers.conf DESTINATION ${prefix}/lib/sysusers.d RENAME stagectl.conf)
 file(INSTALL ${SOURCE}/stagectl.service.d DESTINATION ${docdir})
-file(INSTALL ${SOURCE}/../../docs/checking_the_machine.md ${SOURCE}/../../examples/stage.toml DESTINATION ${docdir})
+file(INSTALL ${SOURCE}/../../docs/operating.md ${SOURCE}/../../docs/checking_the_machine.md ${SOURCE}/../../examples/stage.toml DESTINATION ${docdir})
 
 # Someone's own is left as it is.
 if(NOT EXISTS $ENV{DESTDIR}${sysconfdir}/stagectl/stage.toml)

@@ -2,30 +2,20 @@
 // Records in a nameless file, by pwrite and pread.
 #include "record/spill_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <utility>
+
+#include "image/nameless_file.hpp"
 
 namespace ols {
 
 namespace {
-
-// O_TMPFILE is not for every file system (open(2)).
-int open_nameless(const std::string& folder) {
-    const int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-    if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR && errno != ENOENT)) return fd;
-    std::string name = folder + "/spillXXXXXX";
-    const int named = ::mkostemp(name.data(), O_CLOEXEC);
-    if (named >= 0) ::unlink(name.c_str());
-    return named;
-}
 
 // 0, or the error number.
 int write_at(int fd, std::span<const std::byte> bytes, uint64_t offset) {
@@ -53,7 +43,7 @@ int read_at(int fd, std::span<std::byte> bytes, uint64_t offset) {
 }  // namespace
 
 Result<std::shared_ptr<SpillFile>> SpillFile::create(const std::string& folder, uint64_t bytes_max) {
-    const int fd = open_nameless(folder);
+    const int fd = open_nameless_file(folder);
     if (fd < 0)
         return fail(fmt::format("no frames can be spilled to '{}': {}; choose a folder on a disk that may be written",
                                 folder, std::strerror(errno)));

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include "develop/motion_quality.hpp"
+#include "program.hpp"
+#include "stagectl/session.hpp"
 
 namespace ols {
 
@@ -40,6 +42,25 @@ nlohmann::json TakeParams::to_json() const {
     if (number) params["number"] = *number;
     if (!notes.empty()) params["notes"] = notes;
     return params;
+}
+
+void add_call_verb(CLI::App& app, int& exit_code, const CallVerb& call) {
+    struct Options {
+        DaemonLink link;
+        bool json = false;
+    };
+    auto options = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand(call.name, call.purpose);
+    verb->footer(call.footer);
+    options->link.add_to(*verb);
+    verb->add_flag("--json", options->json, "print as JSON");
+    verb->callback([options, call, &exit_code] {
+        exit_code = report_errors([&] {
+            return call_and_print(
+                options->link, call.name, nlohmann::json::object(),
+                [&](const nlohmann::json& result) { options->json ? print_json(result) : call.print(result); });
+        });
+    });
 }
 
 std::string event_line(const nlohmann::json& event) {

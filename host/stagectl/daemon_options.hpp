@@ -42,6 +42,13 @@ Result<int> call_and_print(const DaemonLink& link, const std::string& method, co
     return 0;
 }
 
+// A verb that is one call of the daemon without parameters of its own: --socket and --json.
+struct CallVerb {
+    const char *name, *purpose, *footer;
+    void (*print)(const nlohmann::json& result);
+};
+void add_call_verb(CLI::App& app, int& exit_code, const CallVerb& verb);
+
 // "12:00:01 warning 306 slots_missing: ..." of an event.
 std::string event_line(const nlohmann::json& event);
 

@@ -230,9 +230,8 @@ int main(int argc, char** argv) {
                   "frames of 12 bits at 2160 a second, from records that are filled beforehand; the board is a model "
                   "of the protocol's other end. Frames are received, identified and checked, targets inverted and "
                   "looked at; no archive is written. Developing is on all processors.",
-         .advice =
-             "A target a cycle is developed while the stage plays. With motion compensation developing is behind: "
-             "give `--memory-mb` or `--spill` room for the share of the recording that speed leaves over."});
+         .advice = "`speed` is the share of real time at which targets are developed. Below 1 developing is behind: "
+                   "give `--memory-mb` or `--spill` room for the share of the recording that speed leaves over."});
     Live live(bench.full());
     measure_capacity(bench, live);
     measure_pace(bench, live);

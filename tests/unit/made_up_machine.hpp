@@ -26,6 +26,18 @@ class MadeUpMachine : public Machine {
     }
 };
 
+// Of the default stage, with nothing named.
+inline CheckUp plain_check_up(const Machine& machine) {
+    return {.machine = machine,
+            .stage = default_stage(),
+            .needs = {},
+            .board_link = "",
+            .cameras = {},
+            .takes_folder = "",
+            .spill_folder = "",
+            .open_board = {}};
+}
+
 // A user `ada` (1000) with no groups but her own, on a machine of which everything else is for the test to write.
 class DoctorTest : public ScratchFolder {
   protected:
@@ -91,14 +103,7 @@ class DoctorTest : public ScratchFolder {
 
     std::string cores = "0-3";
     MadeUpMachine machine{folder_};
-    CheckUp up{.machine = machine,
-               .stage = default_stage(),
-               .needs = {},
-               .board_link = "",
-               .cameras = {},
-               .takes_folder = "",
-               .spill_folder = "",
-               .open_board = {}};
+    CheckUp up = plain_check_up(machine);
 
   private:
     std::vector<std::string> sources_;

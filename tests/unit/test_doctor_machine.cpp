@@ -140,14 +140,7 @@ TEST(ThisMachine, is_read_as_other_programs_read_it) {
     EXPECT_EQ(std::to_string(here.memory_bytes("MemTotal").value_or(0) / 1024),
               output_of("free -k | awk '/^Mem/{print $2}'"));
     const std::string cores = output_of("nproc");
-    CheckUp up{.machine = here,
-               .stage = default_stage(),
-               .needs = {},
-               .board_link = "",
-               .cameras = {},
-               .takes_folder = "",
-               .spill_folder = "",
-               .open_board = {}};
+    CheckUp up = plain_check_up(here);
     for (const Finding& finding : check_processor(up))
         if (finding.check == Check::cores) {
             EXPECT_EQ(finding.found.substr(0, finding.found.find(' ')), cores);

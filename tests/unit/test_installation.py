@@ -55,6 +55,7 @@ def test_everything_is_where_linux_looks_for_it(image):
         f"{local}/lib/sysusers.d/stagectl.conf",
         *(f"{doc}/stagectl.service.d/{name}.conf" for name in ("camera-network", "packet-socket", "takes-folder")),
         f"{doc}/checking_the_machine.md",
+        f"{doc}/operating.md",
         f"{doc}/stage.toml",
         "etc/stagectl/stage.toml",
     }
