@@ -34,7 +34,4 @@ class Api {
     const std::string program_version_;
 };
 
-// A running take's figures, as `status` and the event take_progress have them.
-nlohmann::json progress_json(const RunningTake& take);
-
 }  // namespace ols

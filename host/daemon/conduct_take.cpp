@@ -2,9 +2,8 @@
 // The conductor's takes: from armed by way of light and dark to an archive that is finished.
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "daemon/conductor.hpp"
+#include "image/bytes_text.hpp"
 #include "take/stage_watch.hpp"
 #include "take/take_json.hpp"
 
@@ -40,17 +39,17 @@ void Conductor::say_notes(const std::vector<std::string>& notes) {
 }
 
 Status Conductor::arm_now(const TakeRequest& request) {
-    plan_.reset();
     auto plan = plan_take(request, snapshot().sequence, stage_);
-    if (!plan) return plan.error();
+    if (!plan) return plan.error();  // what is armed stays as it is
+    plan_.reset();
     const DiskForecast& disk = plan->forecast;
     if (!disk.fits()) {
         const std::string why = fmt::format(
             "the disk of '{}' has {} free, of which {} are kept: {:.1f} s of this take fit, and not {:.1f} s, which "
             "take up "
             "to {}; make room, or record a shorter take",
-            stage_.daemon.takes, bytes_words(disk.bytes_free), bytes_words(disk.bytes_reserve), disk.seconds_that_fit,
-            disk.seconds, bytes_words(disk.bytes_needed));
+            stage_.daemon.takes, bytes_text(double(disk.bytes_free)), bytes_text(double(disk.bytes_reserve)),
+            disk.seconds_that_fit, disk.seconds, bytes_text(double(disk.bytes_needed)));
         events_.add(EventKind::disk_short, why, plan->to_json());
         change_state(DaemonState::idle);
         return fail(why);
@@ -77,7 +76,7 @@ Status Conductor::arm_now(const TakeRequest& request) {
     events_.add(EventKind::armed,
                 fmt::format("armed with {}: {} cycles of {} slots, {:.1f} s, up to {} of {} free", plan_->sequence_name,
                             plan_->sequence.config.cycles, plan_->sequence.slots.size(), disk.seconds,
-                            bytes_words(disk.bytes_needed), bytes_words(disk.bytes_free)),
+                            bytes_text(double(disk.bytes_needed)), bytes_text(double(disk.bytes_free))),
                 plan_->to_json());
     change_state(DaemonState::armed);
     return Done{};
@@ -106,17 +105,21 @@ void Conductor::begin_take(std::shared_ptr<RunningTake> take) {
 }
 
 void Conductor::record_now(const TakeRequest& request, const Reply& reply) {
+    std::string name_text;
     const auto refuse = [&](const Error& why) {
-        events_.add(EventKind::take_failed, why.message);
+        events_.add(EventKind::take_failed, why.message, {{"take", name_text}});
         reply_once(reply, Outcome(why));
     };
-    TakeRequest wanted = request;
+    TakeRequest wanted = plan_ ? request.completed_by(plan_->request) : request;
     if (wanted.slate.empty()) wanted.slate = stage_.daemon.slate;
     const auto name = TakeFolder(stage_.daemon.takes).next(wanted.slate, wanted.number);
     if (!name) return reply_once(reply, Outcome(name.error()));
-    if (const Status armed = arm_now(wanted); !armed) return reply_once(reply, Outcome(armed.error()));
+    name_text = name->text();
+    if (!plan_ || !plan_->request.is_armed_like(wanted))
+        if (const Status armed = arm_now(wanted); !armed) return reply_once(reply, Outcome(armed.error()));
     TakePlan plan = std::move(*plan_);
     plan_.reset();
+    plan.choices.slate.scene = wanted.slate, plan.choices.slate.notes = wanted.notes;
     plan.choices.slate.take = fmt::format("{}", name->number);
     plan.choices.output = TakeFolder(stage_.daemon.takes).archive_of(*name);
     for (const std::string& quality : wanted.also)
@@ -178,6 +181,7 @@ Result<TakeReport> Conductor::run_planned(TakePlan& plan, std::vector<PlannedArc
 void Conductor::end_record(const Result<TakeReport>& report, const std::vector<PlannedArchive>& archives,
                            const nlohmann::json& watched) {
     const auto take = snapshot().take;
+    tell_dark(*take);
     if (!report) {
         std::string why = report.error().message;
         if (stop_.wanted && why.find(stop_.why()) == std::string::npos) why += ": " + stop_.why();
@@ -234,6 +238,7 @@ void Conductor::calibrate_now(CardOptions card, const Reply& reply) {
     const auto measured = calibrate_with_card(
         devices_->board(), *devices_->cameras()[card.camera], stage_, card, stop_, [](uint64_t, uint64_t) {},
         &take->monitor.record());
+    tell_dark(*take);
     say_notes(watch->end_take());
     if (!measured) return refuse(stop_.wanted ? fail(measured.error().message + ": " + stop_.why()) : measured.error());
     if (const Status kept = write_calibration(folder, card.camera, measured->calibration, measured->record); !kept)

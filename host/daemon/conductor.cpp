@@ -15,6 +15,21 @@ constexpr std::chrono::milliseconds look_pause(500);
 // For what has begun to be over, from a stop on: the board has Patience::stop_ms for it, and then it is known not to answer.
 constexpr std::chrono::milliseconds dark_patience(Patience::stop_ms + 2000);
 
+double ms_since(std::chrono::steady_clock::time_point begin) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// What is opened once, at the start.
+Status check_lasting(const DaemonSetup& before, const DaemonSetup& now) {
+    const char* const changed = now.socket != before.socket               ? "socket"
+                                : now.socket_group != before.socket_group ? "socket_group"
+                                : now.http_port != before.http_port       ? "http_port"
+                                : now.token_file != before.token_file     ? "token_file"
+                                                                          : nullptr;
+    if (!changed) return Done{};
+    return fail(now.places.at(changed) + " has changed: that takes a restart of the daemon");
+}
+
 }  // namespace
 
 Conductor::Conductor(std::string config_path, StageConfig stage, EventLog& events)
@@ -40,7 +55,9 @@ void TakeTotals::add(const TakeProgress& progress) {
 
 Snapshot Conductor::snapshot() const {
     const std::lock_guard lock(mutex_);
-    return now_;
+    Snapshot now = now_;
+    now.is_busy = bool(job_);
+    return now;
 }
 
 StageConfig Conductor::stage() const {
@@ -109,20 +126,18 @@ Conductor::Outcome Conductor::run(const std::string& method, const std::string& 
     return reply_of(std::move(replied), what);
 }
 
+// Events of the state come in the order of its changes: whatever thread changes it tells it before another can.
 void Conductor::change_state(DaemonState state, const std::string& text, std::optional<DaemonState> from) {
-    DaemonState before;
-    {
-        const std::lock_guard lock(mutex_);
-        before = now_.state;
-        if (from && before != *from) return;
-        now_.state = state;
-        if (state != DaemonState::fault) now_.fault.clear(), now_.fault_is_latched = false;
-        if (state == DaemonState::idle || state == DaemonState::fault) {
-            if (now_.take) now_.totals.add(now_.take->monitor.progress());
-            now_.plan = nullptr, now_.take = nullptr;
-        }
-        changed_.notify_all();
+    const std::lock_guard lock(mutex_);
+    const DaemonState before = now_.state;
+    if (from && before != *from) return;
+    now_.state = state;
+    if (state != DaemonState::fault) now_.fault.clear(), now_.fault_is_latched = false;
+    if (state == DaemonState::idle || state == DaemonState::fault) {
+        if (now_.take) now_.totals.add(now_.take->monitor.progress());
+        now_.plan = nullptr, now_.take = nullptr;
     }
+    changed_.notify_all();
     if (before == state) return;
     events_.add(EventKind::state_changed, fmt::format("{}{}{}", ols::state_name(state), text.empty() ? "" : ": ", text),
                 {{"state", ols::state_name(state)}, {"before", ols::state_name(before)}});
@@ -230,8 +245,7 @@ Conductor::Outcome Conductor::reload() {
         auto read = read_stage(config_path_);
         Status fits = Done{};
         if (read) fits = check_words(read->daemon, *read);
-        if (read && fits && read->daemon.socket != stage_.daemon.socket)
-            fits = fail(read->daemon.places.at("socket") + " has changed: that takes a restart of the daemon");
+        if (read && fits) fits = check_lasting(stage_.daemon, read->daemon);
         if (!read || !fits) {
             const Error& wrong = read ? fits.error() : read.error();
             events_.add(EventKind::configuration_wrong, wrong.message + "; the configuration before stays in force");
@@ -253,9 +267,10 @@ Conductor::Outcome Conductor::reload() {
 // The board is the running take's: it is told through it, and its word is in the take's account. What else is under way is cut short
 // (arming, a look at a board that hangs), and then the board is told and asked by this thread.
 Conductor::Outcome Conductor::stop(const std::string& by) {
-    events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
     const auto asked = Clock::now();
     std::unique_lock lock(mutex_);
+    stop_.ask("stopped by " + by);  // before anybody is told of it
+    events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
     const auto has_dark_take = [&] {
         return now_.take && now_.take->monitor.progress().record.board.dark_confirmed_ns != 0;
     };
@@ -263,23 +278,24 @@ Conductor::Outcome Conductor::stop(const std::string& by) {
         stop_.ask("stopped by " + by);
         changed_.wait_for(lock, std::chrono::milliseconds(2));
     }
-    const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked).count();
-    if (has_dark_take()) return nlohmann::json{{"dark", true}, {"after_ms", after_ms}};
-    if (!job_ && !ends_) {
+    if (has_dark_take()) return nlohmann::json{{"dark", true}, {"after_ms", ms_since(asked)}};
+    if (!job_ && ends_) return fail("the daemon is ending, and darkens the board itself");
+    if (!job_) {
         stop_.ask("stopped by " + by);
-        auto replied = begin_job("a stop", [this, by](const Reply& reply) { reply->set_value(darken(by)); });
+        auto replied = begin_job("a stop", [=, this](const Reply& reply) { reply->set_value(darken(by, asked)); });
         lock.unlock();
-        return reply_of(std::move(replied), "a stop");
+        if (replied.wait_until(asked + dark_patience) == std::future_status::ready)
+            return reply_of(std::move(replied), "a stop");
+    } else {
+        lock.unlock();
     }
-    lock.unlock();
-    const std::string why =
-        fmt::format("the board did not confirm within {:.0f} ms that it is dark: use the emergency stop", after_ms);
+    const std::string why = fmt::format(
+        "the board did not confirm within {:.0f} ms that it is dark: use the emergency stop", ms_since(asked));
     events_.add(EventKind::not_dark, why);
     return fail(why);
 }
 
-Conductor::Outcome Conductor::darken(const std::string& by) {
-    const auto asked = Clock::now();
+Conductor::Outcome Conductor::darken(const std::string& by, Clock::time_point asked) {
     Status dark = hold_devices();
     if (dark) dark = devices_->make_dark();
     if (!dark) {
@@ -289,7 +305,7 @@ Conductor::Outcome Conductor::darken(const std::string& by) {
         events_.add(EventKind::not_dark, why);
         return fail(why);
     }
-    const double after_ms = std::chrono::duration<double, std::milli>(Clock::now() - asked).count();
+    const double after_ms = ms_since(asked);
     events_.add(EventKind::dark, "the board says that it is dark", {{"after_ms", after_ms}, {"by", by}});
     plan_.reset();
     if (snapshot().state == DaemonState::armed) change_state(DaemonState::idle, "stopped by " + by);

@@ -2,6 +2,7 @@
 // Conductor: the daemon's states, and the thread that does what was asked for: it alone uses the board and the cameras.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <functional>
@@ -32,6 +33,7 @@ struct RunningTake {
     uint64_t target_bytes = 0;  // of one target's file at most, summed over the cameras
     std::chrono::steady_clock::time_point began;
     TakeMonitor monitor;
+    mutable std::atomic<bool> dark_is_told = false;
 };
 
 // Of all takes and calibrations since the start.
@@ -51,6 +53,7 @@ struct Snapshot {
     DaemonState state = DaemonState::idle;
     std::string fault, devices, sequence, waits_for;
     bool fault_is_latched = false;  // stays until it is cleared
+    bool is_busy = false;           // something that was asked for is under way
     nlohmann::json plan;            // of what is armed or running
     nlohmann::json last_take;       // what became of it
     std::shared_ptr<const RunningTake> take;
@@ -114,7 +117,7 @@ class Conductor {
     void end_record(const Result<TakeReport>& report, const std::vector<PlannedArchive>& archives,
                     const nlohmann::json& watched);
     void calibrate_now(CardOptions card, const Reply& reply);
-    Outcome darken(const std::string& by);
+    Outcome darken(const std::string& by, Clock::time_point asked);
 
     // Only from the state `from`, where one is given.
     void change_state(DaemonState state, const std::string& text = "", std::optional<DaemonState> from = {});
@@ -125,13 +128,12 @@ class Conductor {
     // What follow() has seen of the running take.
     struct Followed {
         std::shared_ptr<const RunningTake> take;
-        bool dark = false;
         uint64_t missing = 0;  // slots, that were told
         Clock::time_point next_progress, next_missing;
         StuckWatch stages;
     };
     void tell_progress(const TakeProgress& progress, Clock::time_point now);
-    void tell_dark(const BoardProgress& board);
+    void tell_dark(const RunningTake& take);
     void watch_disk(const TakeProgress& progress);
 
     const std::string config_path_;

@@ -8,7 +8,6 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
-#include <poll.h>
 #include <cerrno>
 #include <csignal>
 #include <filesystem>
@@ -56,13 +55,17 @@ class Signals {
     }
 };
 
+// Where it differs from what was said last.
 void notify_state(const Snapshot& now) {
+    static std::string said;
     std::string text = state_name(now.state);
     if (!now.fault.empty()) text += ": " + now.fault;
     if (now.take) text += ": " + now.take->name;
     for (char& c : text)
         if (c == '\n') c = ' ';
+    if (text == said) return;
     sd_notifyf(0, "STATUS=%s", text.c_str());
+    said = std::move(text);
 }
 
 Status check_folders(const DaemonSetup& setup) {
@@ -87,8 +90,8 @@ Status check_folders(const DaemonSetup& setup) {
 // The first signal ends the light and lets what is held be finished; a second one ends at once.
 void shut_down(Conductor& conductor, Signals& signals) {
     conductor.shut_down([&] {
-        sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%llu\nWATCHDOG=1", static_cast<unsigned long long>(ending_extension_us));
-        conductor.follow(stuck_after);
+        if (conductor.follow(stuck_after).empty())
+            sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%llu\nWATCHDOG=1", static_cast<unsigned long long>(ending_extension_us));
         notify_state(conductor.snapshot());
         const int signal = signals.wait(0);
         if (signal == SIGTERM || signal == SIGINT) ::_exit(1);
@@ -97,14 +100,12 @@ void shut_down(Conductor& conductor, Signals& signals) {
 
 void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
     bool is_stuck = false, reload_waits = false;
-    std::string told;
     for (;;) {
         const int signal = signals.wait(look_ms);
         if (signal == SIGTERM || signal == SIGINT) return;
         reload_waits |= signal == SIGHUP;
         const Snapshot now = conductor.snapshot();
-        const bool may_reload = find_method("reload")->is_allowed(now.state);
-        if (reload_waits && may_reload) {
+        if (reload_waits && find_method("reload")->is_allowed(now.state) && !now.is_busy) {
             reload_waits = false;
             (void)conductor.reload();  // what is wrong with it is an event
         }

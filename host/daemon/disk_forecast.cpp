@@ -59,9 +59,4 @@ Result<DiskForecast> forecast_disk(const std::string& folder, const Sequence& se
     return forecast;
 }
 
-std::string bytes_words(uint64_t bytes) {
-    if (bytes < 1'000'000'000) return fmt::format("{:.1f} MB", double(bytes) * 1e-6);
-    return fmt::format("{:.1f} GB", double(bytes) * 1e-9);
-}
-
 }  // namespace ols

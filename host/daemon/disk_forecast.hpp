@@ -34,7 +34,4 @@ Result<DiskForecast> forecast_disk(const std::string& folder, const Sequence& se
 // Bytes that this user may still write where the folder lies. Error: it cannot be asked.
 Result<uint64_t> bytes_free_in(const std::string& folder);
 
-// "12.3 GB".
-std::string bytes_words(uint64_t bytes);
-
 }  // namespace ols

@@ -2,9 +2,9 @@
 // The conductor's look at what runs: progress, the dark, the disk, and whether every stage of the pipeline advances.
 #include <fmt/format.h>
 
-#include "daemon/api.hpp"
 #include "daemon/conductor.hpp"
-#include "steady_clock.hpp"
+#include "daemon/progress_json.hpp"
+#include "image/bytes_text.hpp"
 
 namespace ols {
 
@@ -16,20 +16,21 @@ constexpr std::chrono::milliseconds progress_pause(500), missing_pause(2000);
 
 std::string Conductor::follow(std::chrono::seconds stuck_after) {
     const auto take = snapshot().take;
-    if (take != followed_.take) followed_ = {take, false, 0, {}, {}, {}};
+    if (take != followed_.take) followed_ = {take, 0, {}, {}, {}};
     if (!take) return "";
     const auto now = Clock::now();
     const TakeProgress progress = take->monitor.progress();
-    tell_dark(progress.record.board);
+    tell_dark(*take);
     tell_progress(progress, now);
     watch_disk(progress);
     return followed_.stages.look(progress.record.stages, now, stuck_after);
 }
 
 // The state changes with the board's word, so that nobody steps to the stage by a guess.
-void Conductor::tell_dark(const BoardProgress& board) {
-    if (followed_.dark || board.dark_confirmed_ns == 0) return;
-    followed_.dark = true;
+// Once; also by the take's own thread when it has ended, as a short take is over between two looks.
+void Conductor::tell_dark(const RunningTake& take) {
+    const BoardProgress board = take.monitor.progress().record.board;
+    if (board.dark_confirmed_ns == 0 || take.dark_is_told.exchange(true)) return;
     const double after_ms = board.stop_told_ns ? double(board.dark_confirmed_ns - board.stop_told_ns) * 1e-6 : 0;
     events_.add(EventKind::dark,
                 board.stop_told_ns
@@ -55,7 +56,7 @@ void Conductor::tell_progress(const TakeProgress& progress, Clock::time_point no
 
 // What is recorded and not written yet needs its room, too.
 void Conductor::watch_disk(const TakeProgress& progress) {
-    if (followed_.dark || followed_.take->target_bytes == 0) return;
+    if (followed_.take->dark_is_told || followed_.take->target_bytes == 0) return;
     const StageConfig stage = this->stage();
     const auto free = bytes_free_in(stage.daemon.takes);
     uint64_t waiting = 0;
@@ -66,7 +67,7 @@ void Conductor::watch_disk(const TakeProgress& progress) {
     end_take(
         EventKind::disk_full,
         fmt::format("the disk of '{}' has {} left and {} are kept: the take ends here, and what it has is finished",
-                    stage.daemon.takes, bytes_words(*free), bytes_words(reserve)));
+                    stage.daemon.takes, bytes_text(double(*free)), bytes_text(double(reserve))));
 }
 
 }  // namespace ols

@@ -72,7 +72,7 @@ struct HttpServer::State {
     Api& api;
     EventLog& events;
     BoundedHttpServer server{HttpBounds{}};
-    std::atomic<bool> ends = false;
+    std::atomic<bool> ends = false, has_ended = false;
     std::atomic<int> streams = 0;
     std::mutex mutex;  // of what follows
     CallRate rate;
@@ -167,7 +167,10 @@ Result<std::unique_ptr<HttpServer>> HttpServer::listen(const DaemonSetup& setup,
     state->add_routes();
     if (!state->server.bind_to_port("127.0.0.1", setup.http_port))
         return fail(fmt::format("port {} of 127.0.0.1 is taken: give another [daemon] http_port", setup.http_port));
-    state->thread = std::thread([&state = *state] { state.server.listen_after_bind(); });
+    state->thread = std::thread([&state = *state] {
+        state.server.listen_after_bind();
+        state.has_ended = true;
+    });
     return std::unique_ptr<HttpServer>(new HttpServer(std::move(state)));
 }
 
@@ -175,7 +178,7 @@ HttpServer::HttpServer(std::unique_ptr<State> state) : state_(std::move(state)) 
 
 HttpServer::~HttpServer() {
     state_->ends = true;
-    while (!state_->server.is_running() && state_->thread.joinable())
+    while (!state_->server.is_running() && !state_->has_ended)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));  // stop() before that would be forgotten
     state_->server.stop();
     state_->thread.join();

@@ -123,12 +123,17 @@ void LocalServer::drop_ended() {
 
 void LocalServer::accept() {
     while (!end_) {
-        pollfd ready{listener_, POLLIN, 0};
+        // Beyond that many the others wait in the kernel's queue, which has its own bound.
+        const bool is_full = clients_.size() >= clients_max;
+        pollfd ready{is_full ? -1 : listener_, POLLIN, 0};
         (void)::poll(&ready, 1, look_ms);
         drop_ended();
-        if (clients_.size() >= clients_max) continue;  // the others wait in the kernel's queue, which has its own bound
+        if (is_full) continue;
         const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-        if (fd < 0) continue;
+        if (fd < 0) {
+            if (errno != EAGAIN) (void)::poll(nullptr, 0, look_ms);  // no descriptor is left: not at once again
+            continue;
+        }
         Client& client = *clients_.emplace_back(std::make_unique<Client>(fd));
         client.thread = std::thread([this, &client] {
             serve(client);

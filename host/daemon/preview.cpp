@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "archive/archive.hpp"
 #include "exceptions.hpp"
@@ -16,19 +15,11 @@ namespace ols {
 
 namespace {
 
-Result<LampWeights> weights_for(const std::vector<LightPosition>& lights, const std::string& environment,
-                                double exposure_ev) {
+Result<LampWeights> weights_for(const std::vector<LightPosition>& lights, double exposure_ev) {
     std::vector<Vec3> directions;
     for (const LightPosition& light : lights) directions.push_back(light.direction);
     const auto cells = SphereCells::make(directions);
     if (!cells) return cells.error();
-    if (!environment.empty()) {
-        const auto map = read_environment(environment);
-        if (!map) return map.error();
-        EnvironmentOptions options;
-        options.exposure_ev = exposure_ev;
-        return integrate_environment(*map, *cells, options);
-    }
     const double gain = std::exp2(exposure_ev), fill = 0.3;
     LampWeights weights;
     for (const double solid_angle : cells->solid_angles())
@@ -39,12 +30,11 @@ Result<LampWeights> weights_for(const std::vector<LightPosition>& lights, const 
 
 }  // namespace
 
-Result<Preview> preview_target(const std::string& archive, uint32_t camera, uint32_t index,
-                               const std::string& environment, double exposure_ev) {
+Result<Preview> preview_target(const std::string& archive, uint32_t camera, uint32_t index, double exposure_ev) {
     return guarded("the preview cannot be made", [&]() -> Result<Preview> {
         const auto reader = ArchiveReader::open(archive);
         if (!reader) return reader.error();
-        const auto weights = weights_for(reader->info().lights, environment, exposure_ev);
+        const auto weights = weights_for(reader->info().lights, exposure_ev);
         if (!weights) return weights.error();
         const auto target = reader->open_target(camera, index, TargetCheck::size);
         if (!target) return target.error();

@@ -16,9 +16,8 @@ struct Preview {
     size_t masked_pixels = 0;  // of which the recording does not tell everything
 };
 
-// Lit by an environment map, or, without one, by a key light from above the camera's left and a third of its light from
+// Lit by a key light from above the camera's left and a third of its light from
 // everywhere: shape and shadow show, and nothing is black that was recorded. Tone curve: image/tone.hpp.
-Result<Preview> preview_target(const std::string& archive, uint32_t camera, uint32_t index,
-                               const std::string& environment = "", double exposure_ev = 0);
+Result<Preview> preview_target(const std::string& archive, uint32_t camera, uint32_t index, double exposure_ev = 0);
 
 }  // namespace ols

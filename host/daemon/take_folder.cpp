@@ -23,6 +23,11 @@ bool is_slate_letter(char c) {
            c == '_' || c == ' ';
 }
 
+bool is_plain_name(const std::string& name, size_t letters_max) {
+    return !name.empty() && name.size() <= letters_max && name.front() != '.' && name.front() != ' ' &&
+           name.back() != ' ' && std::ranges::all_of(name, is_slate_letter);
+}
+
 // The number of a take of this slate; nothing for other files.
 std::optional<int> number_in(const std::string& name, const std::string& slate) {
     const std::string start = slate + "_";
@@ -71,8 +76,7 @@ nlohmann::json describe(const std::string& name, const std::string& archive) {
 }  // namespace
 
 Status check_slate(const std::string& slate) {
-    if (slate.empty() || slate.size() > 64 || slate.front() == '.' || slate.front() == ' ' || slate.back() == ' ' ||
-        !std::ranges::all_of(slate, is_slate_letter))
+    if (!is_plain_name(slate, 64))
         return fail(
             "a slate has 1 to 64 letters, digits, '-', '_', '.' and spaces, and begins with none of the last two: it "
             "is "
@@ -125,9 +129,8 @@ Result<TakeName> TakeFolder::next(const std::string& slate, std::optional<int> n
 }
 
 Result<std::string> TakeFolder::find(const std::string& name) const {
-    // A take's name is made of a slate's letters.
-    if (const Status fits = check_slate(name); !fits)
-        return fail("there is no take of that name: `stagectl takes` lists them");
+    // A take's name is made of a slate's letters, and of its number and quality.
+    if (!is_plain_name(name, 96)) return fail("there is no take of that name: `stagectl takes` lists them");
     const fs::path archive = fs::path(path_) / (name + suffix);
     std::error_code error;
     if (!fs::is_directory(archive, error)) return fail("there is no take '" + name + "': `stagectl takes` lists them");

@@ -41,6 +41,21 @@ TakeChoices choices_of(const TakeRequest& request, const DaemonSetup& setup) {
 
 }  // namespace
 
+TakeRequest TakeRequest::completed_by(const TakeRequest& other) const {
+    TakeRequest whole = *this;
+    if (!seconds) whole.seconds = other.seconds;
+    if (!fps) whole.fps = other.fps;
+    if (quality.empty()) whole.quality = other.quality;
+    if (also.empty()) whole.also = other.also;
+    whole.memory_only |= other.memory_only;
+    return whole;
+}
+
+bool TakeRequest::is_armed_like(const TakeRequest& other) const {
+    return seconds == other.seconds && fps == other.fps && quality == other.quality && also == other.also &&
+           memory_only == other.memory_only;
+}
+
 Result<SequenceConfig> find_sequence(const std::string& name, const DaemonSetup& setup) {
     if (const Status fits = check_slate(name); !fits)
         return fail(fmt::format("'{}' names no sequence: give the name of a file in '{}', without .toml, or a basis",

@@ -22,6 +22,11 @@ struct TakeRequest {
     std::vector<std::string>
         also;  // qualities in which a performance is developed besides, each into SLATE_NUMBER-QUALITY.rfa
     bool memory_only = false;  // nothing is spilled: what does not fit into memory is lost, and named
+
+    // What is left out, but for the slate, as in another one.
+    TakeRequest completed_by(const TakeRequest& other) const;
+    // Whether board, cameras and disk are made ready alike for both.
+    bool is_armed_like(const TakeRequest& other) const;
 };
 
 // The sequence named `name`: a file of [daemon] sequences, or a basis with the defaults of everything else. Errors: a name that

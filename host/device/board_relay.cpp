@@ -2,7 +2,6 @@
 // The device's end of "USB transfers over a socket", with a board behind it that its user lends out.
 #include "device/board_relay.hpp"
 
-#include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>

@@ -307,6 +307,7 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     if (state_->problem)
         return fail("the camera's ring is broken, " + problem() + ": start the program that fills it again");
     header.tail.store(state_->tail, std::memory_order_release);
+    state_->dropped = header.dropped.load(std::memory_order_acquire);  // earlier ones are of an earlier take
     state_->running = true;
     if (!state_->wanted) stop();  // it came meanwhile
     futex_wake(header.tail_futex);
@@ -380,7 +381,12 @@ uint64_t RingReader::watermark_ns() const {
 uint64_t RingReader::dropped() const {
     const RingHeader& header = state_->mapping.header();
     const uint64_t all = header.dropped.load(std::memory_order_acquire);
-    return header.head.load(std::memory_order_acquire) == state_->tail ? all : state_->dropped.load();
+    const bool has_read_all = header.head.load(std::memory_order_acquire) == state_->tail;
+    // Another thread may raise it meanwhile; it never falls.
+    uint64_t known = state_->dropped;
+    while (has_read_all && known < all && !state_->dropped.compare_exchange_weak(known, all)) {
+    }
+    return has_read_all ? std::max(known, all) : known;
 }
 
 RingReader::Writer RingReader::writer() const {

@@ -22,17 +22,6 @@ int exit_code_of(const Findings& findings) {
     return count_of(findings, CheckVerdict::warn) > 0 ? 2 : 0;
 }
 
-std::string bytes_text(double bytes) {
-    constexpr const char* units[] = {"bytes", "kB", "MB", "GB", "TB"};
-    size_t unit = 0;
-    while (bytes >= 999.5 && unit + 1 < std::size(units)) {
-        bytes /= 1000;
-        ++unit;
-    }
-    return unit == 0 || bytes >= 99.95 ? fmt::format("{:.0f} {}", bytes, units[unit])
-                                       : fmt::format("{:.3g} {}", bytes, units[unit]);
-}
-
 std::string write_file_command(const std::string& path, const std::vector<std::string>& lines) {
     std::string text;
     for (const std::string& line : lines) {

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "image/bytes_text.hpp"
+
 namespace ols {
 
 // Every check there is. Each gives one finding at least, if only that it was skipped.
@@ -102,9 +104,6 @@ Finding skipped(Check check, std::string why, std::string subject = "");
 // 0: all is well; 2: warnings; 1: something that keeps a shoot from going well.
 int exit_code_of(const Findings& findings);
 size_t count_of(const Findings& findings, CheckVerdict verdict);
-
-// "53.1 MB", "416 kB", "1.33 GB": decimal, as disks and links are sold.
-std::string bytes_text(double bytes);
 
 // A file of settings that lasts: the line that writes it, for a shell.
 std::string write_file_command(const std::string& path, const std::vector<std::string>& lines);

@@ -25,7 +25,7 @@ constexpr uint64_t blind_patience_ns = 10'000'000'000;
 std::string describe(const Frame& frame) {
     const char* names[] = {"none", "rggb", "bggr", "grbg", "gbrg", "rgb"};
     const char* cfa = size_t(frame.cfa) < std::size(names) ? names[size_t(frame.cfa)] : "unknown";
-    return fmt::format("{} x {} pixels, cfa {}, {} bytes", frame.width, frame.height, cfa, frame.samples.size());
+    return fmt::format("{} x {} pixels, cfa {}", frame.width, frame.height, cfa);
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ CameraRecording::CameraRecording(const Sequence& sequence, size_t place, const R
 
 void CameraRecording::handle(RecordEvent event) {
     std::visit([this](auto& news) { take(std::move(news)); }, event);
-    if (log_ended_ && !finished_ && Clock::now() - log_end_ > (stop_ ? stopped_patience : ending_patience))
+    if (log_ended_ && !finished_ && Clock::now() - last_came_ > (stop_ ? stopped_patience : ending_patience))
         finish({Cause::camera_gone,
                 "the camera went on without coming to an end: check it, or the program that reads it"});
     hand_on();
@@ -72,7 +72,7 @@ void CameraRecording::take(FrameNews news) {
     frames_[news.witness.arrival] = std::move(news.frame);
     identifier_.add_frame(std::move(news.witness));
     if (!log_ended_) return;
-    if (!stop_) log_end_ = Clock::now();  // it goes on: patience begins anew
+    if (!stop_) last_came_ = Clock::now();  // it goes on: patience begins anew
     finish_if_beyond(timestamp_ns);
 }
 
@@ -99,7 +99,7 @@ void CameraRecording::take(LogNews news) {
 void CameraRecording::take(LogEnd end) {
     identifier_.end_log(end.why);
     log_ended_ = true;
-    log_end_ = Clock::now();
+    last_came_ = Clock::now();
     log_end_watermark_ns_ = last_watermark_ns_;
     // A camera that is live may have more to give, and says so at its next pause.
     if (camera_state_.kind != CameraState::live) finish_if_all_came();

@@ -62,7 +62,7 @@ class CameraRecording {
     uint64_t frames_after_end_ = 0, frames_beyond_ = 0;  // of the log; of these, from behind the last trigger
     CameraState camera_state_;
     bool log_ended_ = false, finished_ = false;
-    Clock::time_point log_end_;
+    Clock::time_point last_came_;  // the log's end, or the last frame behind it
 };
 
 }  // namespace ols

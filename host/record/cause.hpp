@@ -15,7 +15,7 @@ enum class Cause {
     camera_missed_trigger,  // it fired, and the camera's count did not step
     link_lost_it,           // the camera counted the frame, and it did not come, not whole, or far too late
     host_was_late,          // it came, and there was no room: this program, or its processor, was behind
-    disk_was_late,          // the same, and what was waited for was the archive's disk
+    disk_was_late,          // the same, and what was waited for was a disk
     no_light,               // it came, and is dark where its slot is lit
     stale,                  // it came with the samples of an earlier one
     swapped,                // it came with the light of another slot

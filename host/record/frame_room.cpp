@@ -52,8 +52,8 @@ Status FrameRoom::map_memory() {
     if (error != 0)
         return fail(
             fmt::format("{} MB of memory for frames are not to be had: {}; close other programs, or give less "
-                        "(--memory-mb)",
-                        bytes >> 20, std::strerror(error)));
+                        "(--memory-mb, or [daemon] memory_mb)",
+                        bytes / 1'000'000, std::strerror(error)));
     free_.reserve(options_.frames_max);
     for (size_t n = options_.frames_max; n-- > 0;) free_.push_back(memory_ + n * stride);
     return Done{};
@@ -116,16 +116,11 @@ std::shared_ptr<Frame> FrameRoom::adopt(Frame frame) {
 void FrameRoom::spill(Frame& frame) {
     using Clock = std::chrono::steady_clock;
     const size_t bytes = frame.samples.size();
-    {
-        const std::lock_guard lock(mutex_);
-        disk_works_ = true;
-    }
     const auto begin = Clock::now();
     const auto place = options_.spill->write({frame.samples.data(), bytes});
     const bool was_slow = Clock::now() - begin > options_.period;
     if (place.ok()) frame.samples = {};
     const std::lock_guard lock(mutex_);
-    disk_works_ = false;
     disk_was_slow_ = was_slow;
     if (!place.ok()) return;
     spilled_[&frame] = *place;
@@ -168,7 +163,7 @@ Result<std::shared_ptr<const Frame>> FrameRoom::bring_back(const std::shared_ptr
 
 bool FrameRoom::waits_for_disk() const {
     const std::lock_guard lock(mutex_);
-    return disk_works_ || (options_.spill && (disk_was_slow_ || !options_.spill->problem().empty()));
+    return options_.spill && (disk_was_slow_ || !options_.spill->problem().empty());
 }
 
 RoomUse FrameRoom::use() const {

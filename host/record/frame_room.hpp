@@ -59,8 +59,8 @@ class FrameRoom : public SampleLender, public std::enable_shared_from_this<Frame
     // The frame itself, or where it was spilled, a copy of it with its samples. The errors of SpillFile::read().
     Result<std::shared_ptr<const Frame>> bring_back(const std::shared_ptr<const Frame>& frame);
 
-    // Whether a frame that is dropped now is dropped because of the disk: it is being written to, was too slow for the frame before
-    // this, or has failed.
+    // Whether a frame that is dropped now is dropped because of the disk: it was too slow for the frame before this, or has
+    // failed.
     bool waits_for_disk() const;
 
     RoomUse use() const;
@@ -82,7 +82,7 @@ class FrameRoom : public SampleLender, public std::enable_shared_from_this<Frame
         free_;  // buffers; the last used is taken first, so that no more are touched than are needed
     std::unordered_map<const Frame*, SpillFile::Place> spilled_;
     RoomUse use_;
-    bool disk_works_ = false, disk_was_slow_ = false;
+    bool disk_was_slow_ = false;
 };
 
 }  // namespace ols

@@ -109,7 +109,11 @@ void FramePlacer::process(FrameWitness frame) {
     std::vector<FrameWitness> frames = std::exchange(strays_, {});
     begin_stretch(std::move(frames.front()),
                   {Cause::restarted, "the camera's clock was set anew, and no frame is proved to be this one"});
-    for (size_t n = 1; n < frames.size(); ++n) append(frames[n], *grid_->steps_to(frames[n].stamp.timestamp_ns));
+    for (size_t n = 1; n < frames.size(); ++n)
+        if (const auto steps = steps_on_grid(frames[n]))
+            append(frames[n], *steps);
+        else
+            refuse(frames[n], off_grid);
 }
 
 void FramePlacer::begin_stretch(FrameWitness frame, Reason gap) {
@@ -186,7 +190,7 @@ std::vector<Reason> FramePlacer::take_drops(uint64_t count, uint64_t disk_drops,
     disk_drops_ += by_disk;
     host_drops_ += by_host;
     std::vector<Reason> reasons(
-        by_disk, {Cause::disk_was_late, "dropped: it came, and room was held by what waited for the archive's disk"});
+        by_disk, {Cause::disk_was_late, "dropped: it came, and room was held by what waited for a disk"});
     reasons.resize(by_disk + by_host, {Cause::host_was_late, "dropped: it came, and there was no room for it"});
     return reasons;
 }

@@ -99,8 +99,10 @@ Status SpillFile::read(const Place& place, std::span<std::byte> into) const {
         return disk_failed("spilled frames cannot be read from", error);
     if (XXH3_64bits(into.data(), into.size()) != place.hash) {
         const std::lock_guard lock(mutex_);
-        problem_ = fmt::format("the disk at '{}' gave other samples than were written to it: do not trust it", folder_);
-        return fail(problem_);
+        const std::string why =
+            fmt::format("the disk at '{}' gave other samples than were written to it: do not trust it", folder_);
+        if (problem_.empty()) problem_ = why;
+        return fail(why);
     }
     return Done{};
 }

@@ -22,9 +22,9 @@ struct DaemonSetup {
     std::string takes = "/var/lib/stagectl/takes";
     std::string sequences = "/etc/stagectl/sequences";  // NAME.toml each
     std::string sequence = "s159";                      // of these, or a basis
-    int memory_mb = 0;                                  // for frames of a take; 0: a half of this machine's
+    int memory_mb = 0;                                  // for frames of a take; 0: what developing needs at least
     std::string spill;                                  // folder for frames beyond that; empty: none
-    int spill_mb = 0;                                   // at most; 0: what is free but for the reserve
+    int spill_mb = 0;                                   // at most; 0: as much as the disk has
     int reserve_mb = 1024;                              // of the disk that stay free: a take ends before
 
     // What a take is.

@@ -32,9 +32,10 @@ Result<int> calibrate_by_daemon(const Options& options) {
     nlohmann::json params = {
         {"card", options.card.reflectance}, {"number", options.card.camera}, {"cycles", options.card.cycles}};
     if (options.card.exposure_us > 0) params["exposure_us"] = options.card.exposure_us;
-    if (const auto begun = client->call("subscribe"); !begun.ok()) return begun.error();
-    if (const auto begun = client->call("calibrate", params); !begun.ok()) return begun.error();
-    return TakeFollower(*client, options.json).follow(stop_on_signal());
+    const StopRequest& stop = stop_on_signal();
+    TakeFollower follower(options.daemon, *client, options.json);
+    if (const auto begun = follower.begin("calibrate", params, stop); !begun.ok()) return begun.error();
+    return follower.follow(stop);
 }
 
 Result<int> run(const Options& options) {

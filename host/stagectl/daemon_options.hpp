@@ -30,7 +30,7 @@ struct TakeParams {
     nlohmann::json to_json() const;
 };
 
-// One call, its result printed by `print`, or as JSON with `json`. The verb's exit code.
+// One call, its result printed by `print`. The verb's exit code.
 template <typename Print>
 Result<int> call_and_print(const DaemonLink& link, const std::string& method, const nlohmann::json& params,
                            const Print& print) {

@@ -18,23 +18,27 @@ struct Options {
     bool no_wait = false, json = false;
 };
 
+// Returns when the take has begun.
+Result<int> begin(const Options& options, DaemonClient& client) {
+    const auto begun = client.call("record", options.take.to_json());
+    if (!begun.ok()) return begun.error();
+    if (options.json)
+        print_json(*begun);
+    else
+        fmt::print("{}\n", (*begun)["take"].get<std::string>());
+    return 0;
+}
+
 Result<int> run(const Options& options) {
     auto client = options.link.connect();
     if (!client.ok()) return client.error();
-    TakeFollower follower(*client, options.json);
-    if (!options.no_wait)
-        if (const auto begun = client->call("subscribe"); !begun.ok()) return begun.error();
-    const auto begun = client->call("record", options.take.to_json());
+    if (options.no_wait) return begin(options, *client);
+    const StopRequest& stop = stop_on_signal();
+    TakeFollower follower(options.link, *client, options.json);
+    const auto begun = follower.begin("record", options.take.to_json(), stop);
     if (!begun.ok()) return begun.error();
-    if (options.no_wait || (begun->contains("waits_for") && !options.json)) {
-        if (options.json && options.no_wait) return print_json(*begun), 0;
-        if (begun->contains("waits_for"))
-            say({"waiting for " + (*begun)["waits_for"].get<std::string>()});
-        else
-            fmt::print("{}\n", (*begun)["take"].get<std::string>());
-        if (options.no_wait) return 0;
-    }
-    return follower.follow(stop_on_signal());
+    if (begun->contains("waits_for")) say({"waiting for " + (*begun)["waits_for"].get<std::string>()});
+    return follower.follow(stop);
 }
 
 }  // namespace

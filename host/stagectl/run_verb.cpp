@@ -30,7 +30,7 @@ Status check_account(const Options& options) {
 }
 
 TakeMemory memory_of(const Options& options) {
-    return {options.memory_mb << 20, options.spill, options.spill_mb << 20};
+    return {options.memory_mb * 1'000'000, options.spill, options.spill_mb * 1'000'000};
 }
 
 // Of --arm and --no-arm, or else of the stage.

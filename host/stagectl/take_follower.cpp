@@ -5,8 +5,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <utility>
+
 #include "program.hpp"
-#include "stagectl/daemon_options.hpp"
 #include "stagectl/session.hpp"
 
 namespace ols {
@@ -57,15 +58,38 @@ std::optional<Result<int>> TakeFollower::take(const nlohmann::json& event) {
     return Result<int>(kind == "take_finished" ? exit_code_of(event["data"]) : 0);
 }
 
+// Others may ask for takes, too: their ends are not this one's.
+bool TakeFollower::is_mine(const nlohmann::json& event) const {
+    const std::string kind = event["event"];
+    if (kind.starts_with("calibration_")) return name_.empty();
+    if (kind != "take_finished" && kind != "take_failed") return true;
+    return !name_.empty() && event["data"].value("take", "") == name_;
+}
+
+void TakeFollower::stop_if_wanted(const StopRequest& stop) {
+    if (!stop.wanted || std::exchange(told_to_stop_, true)) return;
+    if (auto other = link_.connect(); other.ok()) (void)other->call("stop");  // how it went is told by events
+}
+
+Result<nlohmann::json> TakeFollower::begin(const std::string& method, const nlohmann::json& params,
+                                           const StopRequest& stop) {
+    if (const auto subscribed = client_.call("subscribe"); !subscribed.ok()) return subscribed;
+    if (const Status sent = client_.send(method, params); !sent.ok()) return sent.error();
+    for (;;) {
+        stop_if_wanted(stop);
+        auto answered = client_.answer(std::chrono::milliseconds(100));
+        if (!answered) continue;
+        if (answered->ok()) name_ = (*answered)->value("take", "");
+        return std::move(*answered);
+    }
+}
+
 Result<int> TakeFollower::follow(const StopRequest& stop) {
-    for (bool told = false;;) {
-        if (stop.wanted && !told) {
-            told = true;
-            if (const Status sent = client_.send("stop"); !sent.ok()) return sent.error();
-        }
+    for (;;) {
+        stop_if_wanted(stop);
         const auto event = client_.next_event(std::chrono::milliseconds(100));
         if (!event.ok()) return event.error();
-        if (!*event) continue;
+        if (!*event || !is_mine(**event)) continue;
         if (auto ended = take(**event)) return std::move(*ended);
     }
 }

@@ -63,8 +63,8 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
         if (frames < least)
             return fail(
                 fmt::format("{} MB of memory for frames hold {} of each camera, and this take needs {} at once: "
-                            "give --memory-mb {} or more",
-                            memory.ram_bytes >> 20, frames, least, (least * bytes >> 20) + 1));
+                            "give {} or more (--memory-mb, or [daemon] memory_mb)",
+                            memory.ram_bytes / 1'000'000, frames, least, least * bytes / 1'000'000 + 1));
         // More than the take has are not needed.
         options.frames_max = size_t(std::clamp<uint64_t>(frames, least, take.sequence.trigger_count() + least));
         options.is_touched = true;

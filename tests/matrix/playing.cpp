@@ -36,7 +36,7 @@ class Account {
                 [this](const MissingSlot& slot) {
                     played_.missing.push_back({slot.counter, cause_name(slot.why.cause), slot.why.text});
                 },
-                [this](uint64_t decided, uint64_t) { decided_ = decided; }, 0,
+                [this](uint64_t decided, uint64_t) { decided_ = decided; }, nullptr,
                 [this] {
                     // Asked for when the recorder finds no room.
                     if (is_closed_) is_full_ = true;

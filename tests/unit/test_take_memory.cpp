@@ -159,7 +159,7 @@ TEST_F(TakeMemories, memory_that_cannot_hold_what_developing_needs_at_once_is_re
     take.memory.ram_bytes = 100'000;
     const auto rooms = make_frame_rooms(take, {});
     ASSERT_FALSE(rooms.ok());
-    EXPECT_NE(rooms.error().message.find("give --memory-mb"), std::string::npos);
+    EXPECT_NE(rooms.error().message.find("or more (--memory-mb"), std::string::npos);
     take.memory.spill_folder = directory + "/none";
     const auto no_folder = make_frame_rooms(take, {});
     ASSERT_FALSE(no_folder.ok());
