@@ -64,7 +64,8 @@ void CameraReader::read() {
         frames_behind_disk_ -= frames_behind_disk_ > 0;
         if (frame) {
             enqueue(std::move(*frame));
-            if (options_.room->waits_for_disk()) frames_behind_disk_ = backlog_max;  // it may have been spilled just now
+            if (options_.room->waits_for_disk())
+                frames_behind_disk_ = backlog_max;  // it may have been spilled just now
             continue;
         }
         options_.room->give_back_place();

@@ -34,7 +34,8 @@ DaemonSetup read_daemon(TomlSection daemon) {
     daemon.read("witness_step", setup.witness_step, 0, 1000);
     daemon.read("nominal", setup.nominal);
     daemon.read("float", setup.single_float);
-    for (const char* key : {"sequence", "slate", "quality", "fill", "estimate", "fps", "socket", "socket_group", "http_port", "token_file", "takes"})
+    for (const char* key : {"sequence", "slate", "quality", "fill", "estimate", "fps", "socket", "socket_group",
+                            "http_port", "token_file", "takes"})
         setup.places[key] = daemon.place(key);
     return setup;
 }
