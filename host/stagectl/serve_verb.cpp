@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // stagectl serve: the daemon.
+#include <nlohmann/json.hpp>
+
 #include "daemon/daemon.hpp"
 #include "program.hpp"
 #include "stagectl/session.hpp"
@@ -11,11 +13,14 @@ namespace {
 
 struct Options {
     DaemonOptions daemon;
-    bool check = false;
+    bool check = false, json = false;
 };
 
 Result<int> run(const Options& options) {
+    if (options.json && !options.check) return fail("--json is of --check: the daemon's log is on standard error");
     const Status done = options.check ? check_configuration(options.daemon.config_path) : run_daemon(options.daemon);
+    if (options.json)
+        print_json({{"configuration", options.daemon.config_path}, {"problem", done.ok() ? "" : done.error().message}});
     if (!done.ok()) return done.error();
     return 0;
 }
@@ -35,6 +40,7 @@ void add_serve_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--config", options->daemon.config_path, "the stage, with a table [daemon]")
         ->capture_default_str();
     verb->add_flag("--check", options->check, "check the configuration, and end");
+    verb->add_flag("--json", options->json, "print what --check found as JSON");
     verb->callback([options, &exit_code] {
         options->daemon.program_version = program_version("stagectl");
         exit_code = report_errors([&] { return run(*options); });

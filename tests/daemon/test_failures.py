@@ -110,10 +110,10 @@ def test_a_configuration_that_is_wrong_is_said_with_file_and_line_and_the_old_on
     for wrong in ('quality = "best"', 'estimate = "guess"', 'fill = "x"', 'slate = "../x"', 'sequence = "none"'):
         daemon.config.write_text(daemon.text.replace(lines[at - 1], wrong).replace('sequence = "single"\n', "", "sequence" in wrong))
         assert f"{daemon.config}:" in daemon.run("reload", code=1), wrong
-        check = subprocess.run(
-            [str(BIN / "stagectl"), "serve", "--check", "--config", str(daemon.config)], capture_output=True, text=True
-        )
-        assert check.returncode == 1 and f"{daemon.config}:" in check.stderr
+        check = [str(BIN / "stagectl"), "serve", "--check", "--json", "--config", str(daemon.config)]
+        checked = subprocess.run(check, capture_output=True, text=True)
+        assert checked.returncode == 1 and f"{daemon.config}:" in checked.stderr
+        assert f"{daemon.config}:" in json.loads(checked.stdout)["problem"]
     assert daemon.run("arm", "--json")["cycles"] == 2
     daemon.run("stop")
     daemon.config.write_text(daemon.text.replace(lines[at - 1], "seconds = 0.5"))

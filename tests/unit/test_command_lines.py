@@ -16,6 +16,8 @@ SCENE = ROOT / "tools/stagesim/scenes/card.toml"
 PROGRAMS = ("stagectl", "rf", "stagesim")
 # What a board or a camera must answer; tests/capture and tests/hil run these with --json.
 NEEDS_A_STAGE = {("stagectl", verb) for verb in ("run", "play", "swap", "status", "calibrate", "flash")} | {("stagesim", "run")}
+# What a daemon must answer, or is; tests/daemon runs these with --json.
+NEEDS_A_STAGE |= {("stagectl", verb) for verb in ("serve", "arm", "record", "stop", "takes", "preview", "log", "reload")}
 
 
 def run(*command, **options):

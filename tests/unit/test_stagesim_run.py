@@ -109,9 +109,9 @@ def read_ring(ring):
         frames = []
         for n in range(head):
             at = 192 + n * stride
-            fields = struct.unpack_from("<IIIIIIQQffQ", ring, at)
-            _, width, height, sample_format, _, _, frame_id, time_ns, _, _, size = fields
-            samples = np.frombuffer(ring[at + 56 : at + 56 + size], dtype="<u2" if sample_format == 1 else "<f4")
+            fields = struct.unpack_from("<IIIIIIQQffQQ", ring, at)
+            _, width, height, sample_format, _, _, frame_id, time_ns, _, _, size, _ = fields
+            samples = np.frombuffer(ring[at + 64 : at + 64 + size], dtype="<u2" if sample_format == 1 else "<f4")
             frames.append((frame_id, time_ns, samples.reshape(height, width, -1).astype(np.float64)))
         return frames, watermark_ns
 
