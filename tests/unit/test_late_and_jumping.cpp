@@ -79,6 +79,20 @@ TEST_F(LateAndJumping, a_count_that_passes_more_ids_than_there_were_triggers_is_
     EXPECT_EQ(outcome().mislabelled, 0);
 }
 
+// Four in a row fit each other, ids as times, and lie further apart than the sequence is long: no stretch is made of them.
+TEST_F(LateAndJumping, strays_that_step_beyond_the_sequence_in_ids_and_times_are_no_stretch) {
+    constexpr uint64_t far = 1'000'000'000;
+    const auto period_ns = uint64_t(cycle_ns_ / stage_.sequence.slots.size());
+    for (uint64_t n = 300; n < 304; ++n) {
+        CameraStamp& stamp = take_.frames[n].witness.stamp;
+        stamp.frame_id += far * (n - 299), stamp.timestamp_ns += far * (n - 299) * period_ns;
+    }
+    const Outcome far_off = outcome();
+    EXPECT_EQ(far_off.mislabelled, 0);
+    EXPECT_TRUE(far_off.accounted);
+    for (uint64_t n = 300; n < 304; ++n) EXPECT_TRUE(far_off.missing.contains(n)) << n;
+}
+
 TEST_F(LateAndJumping, what_is_wrong_with_a_frame_itself_is_its_cause_where_its_run_is_not_proved) {
     take_.frames[212].witness.unfit = {Cause::stale, "stale"};
     take_.frames[216].witness.summary = take_.frames[220].witness.summary;  // a tracking slot that looks like a lamp

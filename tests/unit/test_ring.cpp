@@ -126,6 +126,10 @@ TEST(Ring, a_full_ring_drops_and_counts_when_the_writer_may_not_wait) {
     EXPECT_EQ(ring.writer.write(numbered_frame(13), false, never), Outcome::full);
     EXPECT_EQ(ring.reader.read(0)->stamp.frame_id, 11u);
     EXPECT_EQ(ring.reader.dropped(), 4u);
+    EXPECT_EQ(ring.reader.read(0)->stamp.frame_id, 12u);
+    EXPECT_EQ(ring.reader.dropped(), 5u);
+    EXPECT_EQ(ring.writer.write(numbered_frame(14), false, never), Outcome::written);
+    EXPECT_EQ(ring.reader.dropped(), 5u) << "what was told of is not taken back";
 }
 
 TEST(Ring, a_waiting_writer_gives_up_when_cancelled) {
