@@ -89,7 +89,7 @@ void change(RingFile& file, Script& script) {
     if (how % 8 == 7) return file.cut(size_t(script.byte()) * 8);
     if (how % 8 < 4) {  // a frame, and the count of it
         const uint64_t n = script.byte();
-        RingFrame frame{0, 16, 8, PixelFormat::u16, Cfa::rggb, 32, n, 1000 * n, 0, 4095, 256};
+        RingFrame frame{0, 16, 8, PixelFormat::u16, Cfa::rggb, 32, n, 1000 * n, 0, 4095, 256, 0};
         auto* bytes = reinterpret_cast<uint8_t*>(&frame);
         for (uint8_t changes = how / 8 % 4; changes > 0; changes--) bytes[script.byte() % sizeof frame] = script.byte();
         file.put(sizeof(RingHeader) + n % slots * stride, &frame, sizeof frame);
