@@ -133,6 +133,29 @@ def udev(guest):
     guest.run(["/lib/systemd/systemd-udevd", "--daemon"])
 
 
+@pytest.fixture
+def udev_rules(guest, udev):
+    """The project's udev rules, to install during a test: before it and behind it the guest has none."""
+
+    class Rules:
+        path = "/etc/udev/rules.d/60-open-light-stage.rules"
+
+        def install(self):
+            self._change("cp", ROOT / "host/device/60-open-light-stage.rules", self.path)
+
+        def remove(self):
+            self._change("rm", "-f", self.path)
+
+        def _change(self, *command):
+            guest.run(list(command))
+            guest.run(["udevadm", "control", "--reload"])
+
+    rules = Rules()
+    rules.remove()
+    yield rules
+    rules.remove()
+
+
 @pytest.fixture(scope="session")
 def port(guest, udev):
     """The guest's USB port."""

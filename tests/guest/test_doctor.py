@@ -4,13 +4,10 @@ nothing changes by it."""
 import json
 import sys
 
-from conftest import ROOT
 from gpio_chip import NAMES
 from test_gpio import STAGE
 from test_usb import NOBODY
 
-RULES = ROOT / "host/device/60-open-light-stage.rules"
-RULES_THERE = "/etc/udev/rules.d/60-open-light-stage.rules"
 
 
 def doctor(stagectl, *arguments, **options):
@@ -66,17 +63,15 @@ def test_a_can_interface_is_what_ip_says_of_it(guest, bus, stagectl):
     guest.run(["ip", "link", "set", lane.name, "up"])
 
 
-def test_a_board_on_usb_is_found_by_who_may_open_it(guest, emulated, usb, stagectl):
-    guest.run(["rm", "-f", RULES_THERE])
-    guest.run(["udevadm", "control", "--reload"])
+def test_a_board_on_usb_is_found_by_who_may_open_it(guest, emulated, usb, stagectl, udev_rules):
     port = usb(emulated())
     found = doctor(stagectl, "--board", "usb:", user=NOBODY)
     assert only(found, "permissions.udev_rules")["status"] == "fail"
     assert only(found, "permissions.nodes")["status"] == "fail"
     assert only(found, "board.link")["status"] == "fail" and "no permission" in only(found, "board.link")["found"]
-    guest.run(["cp", RULES, RULES_THERE])
+    udev_rules.install()
     found = doctor(stagectl, "--board", "usb:")
-    assert only(found, "permissions.udev_rules")["found"] == RULES_THERE
+    assert only(found, "permissions.udev_rules")["found"] == udev_rules.path
     for check in ("permissions.nodes", "board.link", "board.firmware", "board.fault"):
         assert only(found, check)["status"] == "ok", only(found, check)
     (node,) = found["permissions.nodes"]

@@ -7,14 +7,12 @@ import sys
 
 import pytest
 from boot_rom import EXCLUSIVE_ACCESS, EXIT_XIP, FLASH_ERASE, READ, REBOOT, WRITE, BootRom
-from conftest import INSIDE, ROOT, STAGECTL, UF2, settle
+from conftest import INSIDE, STAGECTL, UF2, settle
 from flash_chip import FLASH_BYTES, FLASH_START, PAGE_BYTES, SECTOR_BYTES, FlashChip, uf2_pages
 from usb_port import BoardCable
 
 SERIAL = "00f1e2d3c4b5a697"
 NOBODY = 65534
-RULES = ROOT / "host/device/60-open-light-stage.rules"
-RULES_THERE = "/etc/udev/rules.d/60-open-light-stage.rules"
 NOTE = FLASH_START + FLASH_BYTES - SECTOR_BYTES  # which board the image is for, while its label is not there
 
 NEW = uf2_pages(UF2)
@@ -118,7 +116,7 @@ def test_after_a_cable_pulled_in_the_middle_of_writing_the_same_command_complete
     bench.finish(flash(guest))
 
 
-def test_without_permission_the_udev_rule_is_named_and_with_it_the_boot_loader_answers(guest, bench, stagectl):
+def test_without_permission_the_udev_rule_is_named_and_with_it_the_boot_loader_answers(guest, bench, stagectl, udev_rules):
     plugdev = grp.getgrnam("plugdev").gr_gid
     bench.flash = FlashChip(changed(BOARD_AT, BOARD_BYTES, "feather_can"))
     before = bytes(bench.flash.cells)
@@ -127,16 +125,11 @@ def test_without_permission_the_udev_rule_is_named_and_with_it_the_boot_loader_a
     refused = stagectl("flash", UF2, user=NOBODY, groups=[plugdev])
     assert refused.returncode == 1 and "install the udev rule 60-open-light-stage.rules" in refused.stderr, refused.stderr
     assert rom.commands == []
-    try:
-        guest.run(["cp", RULES, RULES_THERE])
-        guest.run(["udevadm", "control", "--reload"])
-        bench.port.unplug()
-        rom = bench.plug_loader()
-        settle(guest, "RP2 Boot")
-        other = stagectl("flash", UF2, user=NOBODY, groups=[plugdev])
-    finally:
-        guest.run(["rm", "-f", RULES_THERE])
-        guest.run(["udevadm", "control", "--reload"])
+    udev_rules.install()
+    bench.port.unplug()
+    rom = bench.plug_loader()
+    settle(guest, "RP2 Boot")
+    other = stagectl("flash", UF2, user=NOBODY, groups=[plugdev])
     assert other.returncode == 1 and "for the board 'pico' and this is a 'feather_can'" in other.stderr, other.stderr
     assert [command for command, *_ in rom.commands] == [EXCLUSIVE_ACCESS, EXIT_XIP, READ]
     assert bench.flash.cells == before

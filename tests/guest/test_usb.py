@@ -12,7 +12,6 @@ SEQUENCE = ROOT / "examples/sequence_s159.toml"
 WAITING_SEQUENCE = ROOT / "examples/sequence_photo.toml"  # each cycle waits for an edge, which does not come
 SERIAL = "00f1e2d3c4b5a697"
 NOBODY = 65534
-RULES = ROOT / "host/device/60-open-light-stage.rules"
 
 
 def test_a_board_on_usb_is_found_and_the_kernel_lists_the_same(guest, emulated, usb, stagectl):
@@ -65,14 +64,13 @@ def test_a_second_program_is_refused_while_the_first_has_the_board(guest, emulat
     assert first.wait() == 0, first.errors
 
 
-def test_without_permission_the_udev_rule_is_named_and_with_it_the_group_may(guest, emulated, usb, stagectl):
+def test_without_permission_the_udev_rule_is_named_and_with_it_the_group_may(emulated, usb, stagectl, udev_rules):
     plugdev = grp.getgrnam("plugdev").gr_gid
     board = emulated()
     port = usb(board)
     refused = stagectl("status", "--board", "usb:", user=NOBODY, groups=[plugdev])
     assert refused.returncode == 1 and "60-open-light-stage.rules" in refused.stderr, refused.stderr
-    guest.run(["cp", RULES, "/etc/udev/rules.d/"])
-    guest.run(["udevadm", "control", "--reload"])
+    udev_rules.install()
     port.unplug()
     usb(board)
     allowed = stagectl("status", "--json", "--board", "usb:", user=NOBODY, groups=[plugdev])

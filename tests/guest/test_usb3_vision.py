@@ -7,12 +7,10 @@ import time
 
 import numpy
 import pytest
-from conftest import DESCRIBE_CAMERA, ROOT, settle
+from conftest import DESCRIBE_CAMERA, settle
 from u3v_camera import CHUNK_FEATURES, U3vCamera, description
 from u3v_registers import Status
 
-RULES = ROOT / "host/device/60-open-light-stage.rules"
-RULES_THERE = "/etc/udev/rules.d/60-open-light-stage.rules"
 NOBODY = 65534
 WIDTH, HEIGHT = 64, 48
 DATA_DISCARDED, DATA_OVERRUN = 0xA100, 0xA101  # USB3 Vision 1.0.1, status codes of a trailer
@@ -217,30 +215,22 @@ def test_of_two_cameras_the_one_that_is_named_is_used(plugged, camera):
         assert program.end()["state"] == "live"
 
 
-def test_without_permission_the_udev_rule_is_named_and_with_it_the_group_may(guest, plugged, camera):
+def test_without_permission_the_udev_rule_is_named_and_with_it_the_group_may(plugged, camera, udev_rules):
     plugdev = {"user": NOBODY, "groups": [grp.getgrnam("plugdev").gr_gid]}
-
-    def rules(command):
-        guest.run(["sh", "-c", f"{command}; udevadm control --reload"])
-
-    rules(f"rm -f {RULES_THERE}")
     device = plugged()
     for name in ("", device.serial):
         error = camera("aravis:" + name, 1, **plugdev, **stage()).end()["error"]
         assert "no permission for the USB3 Vision camera at bus" in error, error
         assert "install the udev rule 60-open-light-stage.rules" in error, error
     assert device.written == []
-    try:
-        rules(f"cp {RULES} {RULES_THERE}")
-        device.port.unplug()
-        allowed = plugged()
-        program = started(camera("aravis:", 1, **plugdev, **stage()))
-        expose(program, allowed, 1)
-        assert program.end()["state"] == "live"
-        error = camera("aravis:", 1, user=NOBODY, **stage()).end()["error"]
-        assert "60-open-light-stage.rules is installed" in error, error
-    finally:
-        rules(f"rm -f {RULES_THERE}")
+    udev_rules.install()
+    device.port.unplug()
+    allowed = plugged()
+    program = started(camera("aravis:", 1, **plugdev, **stage()))
+    expose(program, allowed, 1)
+    assert program.end()["state"] == "live"
+    error = camera("aravis:", 1, user=NOBODY, **stage()).end()["error"]
+    assert "60-open-light-stage.rules is installed" in error, error
 
 
 # Losses.
