@@ -111,6 +111,12 @@ struct BoardRelay::Client {
         return true;
     }
 
+    // Also while there is still something of it to be read.
+    bool has_left() const {
+        pollfd state{fd, 0, 0};
+        return ::poll(&state, 1, 0) == 1 && (state.revents & (POLLHUP | POLLERR));
+    }
+
     const int fd;
     std::vector<uint8_t> input, messages, output;
     std::unique_ptr<ols_frame_parser> parser;
@@ -143,6 +149,9 @@ Status BoardRelay::serve(Board& board) {
     // After that: one that left makes room for the next.
     const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) return Done{};
+    // One that had its answer just now may have left before this one came.
+    while (client_ && client_->has_left())
+        if (const Status served = serve_client(board); !served.ok()) return ::close(fd), served;
     if (!client_) {
         client_ = std::make_unique<Client>(fd);
         return Done{};

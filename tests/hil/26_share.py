@@ -120,6 +120,16 @@ def test_the_board_is_asked_by_others_while_it_plays_and_one_at_a_time(play):
     assert not playing.shared.exists()
 
 
+def test_who_comes_when_another_has_just_left_is_answered(play):
+    playing = play([1, 2])
+    for _ in range(60):
+        link = Link(Usb(playing.shared))
+        assert link.status()["state"] == wire.PLAYING
+        link.usb.close()
+    code, errors = playing.end(signal.SIGINT)
+    assert code == 0, errors
+
+
 @pytest.mark.parametrize("damage", [b"x" * 100, struct.pack("<IIBBHII8x", 0x54425355, 1, 1, 1, 0, 1 << 31, 0),
                                     struct.pack("<IIBBHII8x", 0x54425355, 1, 1, 0x82, 0, 64, 0) * 2,
                                     struct.pack("<IIBBHII8x", 0x54425355, 1, 1, 1, 0, 5000, 0) + bytes(5000)])
