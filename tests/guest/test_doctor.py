@@ -9,7 +9,6 @@ from test_gpio import STAGE
 from test_usb import NOBODY
 
 
-
 def doctor(stagectl, *arguments, **options):
     """Findings by id, then by subject."""
     done = stagectl("doctor", "--quick", "--json", *arguments, **options)
