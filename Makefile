@@ -34,8 +34,7 @@ assets: setup ## fetch the CC0 head and environment maps into .cache/assets
 demo: all assets ## the whole system once, end to end; results in out/demo
 	@$(PYTHON) tools/demo/demo.py --out out/demo
 
-test: all checked assets lint-fast unit stability bench-smoke daemon-test hil matrix-pytest ## everything that needs no hardware
-	@$(SIDE_BY_SIDE) fuzz-smoke guest-test
+test: all checked assets lint-fast unit stability bench-smoke fuzz-smoke daemon-test hil matrix-pytest guest-test ## everything that needs no hardware
 	@echo "make test: all passed"
 
 unit: checked firmware ## unit tests: C++ with sanitizers, Python, JavaScript
@@ -82,9 +81,8 @@ matrix: host ## every fault between trigger and frame, a thousand times on each 
 guest-test: all ## stagectl on the real kernel's CAN, USB, V4L2 and GPIO, in a QEMU guest (the first time some 220 MB to download)
 	@$(PYTHON) -m pytest -q tests/guest
 
-# The guest's tests, which wait more than they compute, go beside it.
 fuzz-smoke: setup ## earlier findings and a fixed set of inputs through every fuzzer
-	@nice tests/fuzz/run.sh smoke
+	@tests/fuzz/run.sh smoke
 
 fuzz: setup ## ten minutes of every fuzzer; SECONDS_EACH=n for another budget
 	@tests/fuzz/run.sh $(or $(SECONDS_EACH),600)
