@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
 
 #include "develop/parity_sums.hpp"
 #include "develop/row_hypotheses.hpp"
@@ -40,6 +39,21 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+// Mean squared differences of rows from `last`, in units of two rows' noise. Sample by sample, as they lie in memory.
+std::vector<double> changes_from(const Eigen::MatrixXf& last, const ParitySamples& samples) {
+    Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(last.rows());
+    double count = 0;
+    for (Eigen::Index k = 0; k < last.cols(); ++k) {
+        const double variance = double(samples.variance()(k));
+        if (variance <= 0) continue;
+        const auto now = samples.counts().col(k).array().cast<double>();
+        squares += (now - last.col(k).array().cast<double>()).square() * (0.5 / variance);
+        ++count;
+    }
+    squares /= count;
+    return {squares.begin(), squares.end()};
+}
+
 }  // namespace
 
 const char* row_fault_name(RowFault fault) {
@@ -70,34 +84,12 @@ ParityWitness::ParityWitness(const Basis& basis) : basis_(basis), checks_(parity
         for (int row = 0; row < basis.rows; ++row) inverse_(image, row) = basis.inverse(row, image);
 }
 
-// Sample by sample, as they lie in memory, all rows of a sample at once.
-std::vector<double> ParityWitness::changes(const ParitySamples& samples, const std::vector<int>& last_row_of) const {
-    const size_t rows = last_row_of.size();
-    std::vector<double> squares(rows);
-    double count = 0;
-    for (Eigen::Index k = 0; k < last_.cols(); ++k) {
-        const double variance = double(samples.variance()(k));
-        if (variance <= 0) continue;
-        const float* const now = samples.counts().col(k).data();
-        const float* const last = last_.col(k).data();
-        for (size_t row = 0; row < rows; ++row) {
-            const double difference = double(now[row]) - double(last[last_row_of[row]]);
-            squares[row] += difference * difference / (2 * variance);
-        }
-        ++count;
-    }
-    for (double& sum : squares) sum /= count;
-    return squares;
-}
-
 // Mean squared difference of each row from the last target's, in units of two rows' noise: 1 but for what the subject, the lamps and
 // the camera do, which is in all rows alike. The median tells that, and the spread about it how alike.
 std::optional<RowFinding> ParityWitness::find_changed(const ParitySamples& samples,
                                                       const std::vector<int>& lost_rows) const {
     if (last_.cols() != samples.counts().cols()) return {};
-    std::vector<int> rows(size_t(basis_.rows));
-    std::iota(rows.begin(), rows.end(), 0);
-    std::vector<double> changes = this->changes(samples, rows), known;
+    std::vector<double> changes = changes_from(last_, samples), known;
     for (const int row : lost_rows) changes[size_t(row)] = NAN;
     for (const double own : changes)
         if (std::isfinite(own)) known.push_back(own);
@@ -114,8 +106,9 @@ std::optional<RowFinding> ParityWitness::find_changed(const ParitySamples& sampl
             changed.push_back(row), most = std::max(most, far);
     if (changed.size() == 1) return RowFinding{RowFault::changed, {{changed[0]}}, -1, most, 1};
     if (changed.size() != 2) return {};  // none, or a subject that moved, or light that did
-    std::swap(rows[size_t(changed[0])], rows[size_t(changed[1])]);
-    const std::vector<double> exchanged = this->changes(samples, rows);
+    Eigen::MatrixXf crossed_rows = last_;
+    crossed_rows.row(changed[0]).swap(crossed_rows.row(changed[1]));
+    const std::vector<double> exchanged = changes_from(crossed_rows, samples);
     const double crossed = std::max(exchanged[size_t(changed[0])], exchanged[size_t(changed[1])]);
     if ((crossed - middle) / spread < least) return RowFinding{RowFault::swapped, {changed}, -1, most, 1};
     return RowFinding{RowFault::changed, {{changed[0]}, {changed[1]}}, -1, most, 1};

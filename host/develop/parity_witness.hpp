@@ -69,8 +69,6 @@ class ParityWitness {
                         int threads);
 
   private:
-    // Of each row from one of the last target's.
-    std::vector<double> changes(const ParitySamples& samples, const std::vector<int>& last_row_of) const;
     std::optional<RowFinding> find_changed(const ParitySamples& samples, const std::vector<int>& lost_rows) const;
     void remember(const ParitySamples& samples, const std::vector<int>& lost_rows, const ParityVerdict& verdict);
 

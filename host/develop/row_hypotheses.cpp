@@ -120,12 +120,16 @@ double robust_spread(std::vector<double> values) {
 // as in the dark, there is no such pair.
 std::optional<RowFinding> find_copied(const ParityEvidence& evidence) {
     const std::vector<Pair> pairs = pairs_of(evidence);
+    std::vector<std::vector<double>> excesses;  // of each strip's pairs
+    for (const StripSums& strip : evidence.strips) {
+        auto& excess = excesses.emplace_back();
+        for (const Pair& pair : pairs) excess.push_back(difference(strip, pair) - 2 * strip.noise);
+    }
     std::optional<RowFinding> found;
     for (int first = 0; first < parity_strips; ++first) {
         std::vector<double> excess(pairs.size());
         for (int last = first; last < parity_strips; ++last) {
-            const StripSums& strip = evidence.strips[size_t(last)];
-            for (size_t p = 0; p < pairs.size(); ++p) excess[p] += difference(strip, pairs[p]) - 2 * strip.noise;
+            for (size_t p = 0; p < pairs.size(); ++p) excess[p] += excesses[size_t(last)][p];
             const double share = double(last - first + 1) / parity_strips;
             if (found && found->share >= share) continue;
             const RunSums run = run_sums(evidence, first, last);

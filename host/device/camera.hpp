@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "device/row_copy.hpp"
 #include "image/frame.hpp"
 #include "result.hpp"
 #include "stage/camera_setup.hpp"
@@ -83,6 +84,9 @@ class Camera {
     // Frames that are read from now on have their samples in what is lent, where the driver makes them as they are read (new_frame());
     // null: in memory of their own. Not during read().
     void borrow_from(std::shared_ptr<SampleLender> lender) { lender_ = std::move(lender); }
+    // Who sees the rows of frames that are read from now on as they are copied, where the driver copies rows (copy_rows()); null:
+    // nobody. Not during read().
+    void show_to(RowWatcher* watcher) { watcher_ = watcher; }
 
   protected:
     // For drivers, in read(): a frame without samples, and with room for them.
@@ -92,8 +96,13 @@ class Camera {
         return frame;
     }
 
+    // For a frame of which all but the samples is set.
+    void copy_rows(const std::byte* samples, Frame& frame) { row_copy_.copy(samples, frame, watcher_); }
+
   private:
     std::shared_ptr<SampleLender> lender_;
+    RowWatcher* watcher_ = nullptr;
+    RowCopy row_copy_;
 };
 
 // "aravis:SERIAL" is a GigE Vision or USB3 Vision camera, "aravis:" the only one there is (device/aravis_camera.hpp);

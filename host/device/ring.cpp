@@ -63,10 +63,10 @@ bool is_taken(int fd, End end) {
 // Whether a frame's samples can be where its RingFrame says.
 bool is_sound(const RingFrame& frame, const RingLayout& layout) {
     const RingContent& content = layout.content;
-    const uint64_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
-    const uint64_t row_bytes = frame.width * uint64_t(samples_per_pixel(frame.cfa)) * sample_bytes;
+    const uint64_t bytes = sample_bytes(frame.format);
+    const uint64_t row_bytes = frame.width * uint64_t(samples_per_pixel(frame.cfa)) * bytes;
     return frame.format == content.format && frame.cfa == content.cfa && frame.width <= content.width &&
-           frame.height <= content.height && frame.pitch_bytes >= row_bytes && frame.pitch_bytes % sample_bytes == 0 &&
+           frame.height <= content.height && frame.pitch_bytes >= row_bytes && frame.pitch_bytes % bytes == 0 &&
            uint64_t(frame.pitch_bytes) * frame.height <= frame.bytes &&
            frame.bytes <= layout.stride - sizeof(RingFrame) && std::isfinite(frame.black) &&
            std::isfinite(frame.white) && frame.black < frame.white;
@@ -183,7 +183,7 @@ RingWriter::Outcome RingWriter::write(const Frame& frame, bool wait, const std::
         if (!wanted()) return Outcome::unwanted;
         if (head - header.tail.load(std::memory_order_acquire) < mapping_->layout.slots) break;
         if (!wait) {
-            header.dropped.fetch_add(1, std::memory_order_relaxed);
+            header.dropped.fetch_add(1, std::memory_order_release);  // who sees it sees the head before it
             return Outcome::full;
         }
         if (cancelled.load()) return Outcome::cancelled;
@@ -277,6 +277,7 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     state_->running = false;
     state_->wanted = true;
     header.running.store(0, std::memory_order_release);
+    state_->dropped = header.dropped.load(std::memory_order_acquire);  // these are of an earlier take
     const uint32_t start = header.asked.load(std::memory_order_relaxed) + 1;
     const uint32_t answered_before = header.started.load(std::memory_order_acquire);
     header.asked.store(start, std::memory_order_release);
@@ -307,7 +308,6 @@ Result<uint64_t> RingReader::start(int patience_ms) {
     if (state_->problem)
         return fail("the camera's ring is broken, " + problem() + ": start the program that fills it again");
     header.tail.store(state_->tail, std::memory_order_release);
-    state_->dropped = header.dropped.load(std::memory_order_acquire);  // earlier ones are of an earlier take
     state_->running = true;
     if (!state_->wanted) stop();  // it came meanwhile
     futex_wake(header.tail_futex);
@@ -332,14 +332,23 @@ uint64_t RingReader::frames_waiting() const {
     return state_->problem ? 0 : waiting;
 }
 
-std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame()>& new_frame) {
+std::optional<Frame> RingReader::read(int timeout_ms) {
+    return read(
+        timeout_ms, [] { return Frame(); },
+        [](const std::byte* samples, Frame& frame) {
+            frame.samples.assign(samples, samples + size_t(frame.pitch_bytes) * frame.height);
+        });
+}
+
+std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame()>& new_frame,
+                                      const std::function<void(const std::byte*, Frame&)>& copy_rows) {
     RingHeader& header = state_->mapping.header();
     const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
     while (state_->running && !state_->problem) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
         if (frames_waiting() > 0) {
-            Frame frame = take_frame(new_frame());
-            if (state_->mapping.memory.cut()) return std::nullopt;
+            Frame frame = take_frame(new_frame(), copy_rows);
+            if (state_->mapping.memory.cut() || state_->problem) return std::nullopt;
             return frame;
         }
         const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
@@ -349,7 +358,7 @@ std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame(
     return std::nullopt;
 }
 
-Frame RingReader::take_frame(Frame frame) {
+Frame RingReader::take_frame(Frame frame, const std::function<void(const std::byte*, Frame&)>& copy_rows) {
     const RingMapping& mapping = state_->mapping;
     const std::byte* record = mapping.record(state_->tail);
     RingFrame meta;
@@ -363,15 +372,21 @@ Frame RingReader::take_frame(Frame frame) {
     frame.pitch_bytes = meta.pitch_bytes;
     frame.black = meta.black;
     frame.white = meta.white;
-    if (is_sound(meta, mapping.layout)) {
-        const std::byte* samples = record + sizeof meta;
-        frame.samples.assign(samples, samples + size_t(meta.pitch_bytes) * meta.height);
-    }
-    state_->dropped = std::max(state_->dropped.load(), meta.dropped_before);
+    if (is_sound(meta, mapping.layout)) copy_rows(record + sizeof meta, frame);
+    note_drops(meta.dropped_before);
     ++state_->tail;
     mapping.header().tail.store(state_->tail, std::memory_order_release);
     futex_wake(mapping.header().tail_futex);
     return frame;
+}
+
+// A count that the writer alone knows; what it says of it at one place must agree with the other.
+void RingReader::note_drops(uint64_t before_frame) {
+    const uint64_t all = state_->mapping.header().dropped.load(std::memory_order_acquire);
+    if (before_frame < state_->dropped || before_frame > all)
+        state_->problem = "its counts of dropped frames contradict each other";
+    else
+        state_->dropped = before_frame;
 }
 
 uint64_t RingReader::watermark_ns() const {

@@ -38,8 +38,7 @@ struct RingContent {
     uint32_t reserved = 0;
 
     uint64_t frame_bytes() const {
-        const uint64_t sample_bytes = format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
-        return uint64_t(width) * height * uint64_t(samples_per_pixel(cfa)) * sample_bytes;
+        return uint64_t(width) * height * uint64_t(samples_per_pixel(cfa)) * sample_bytes(format);
     }
 };
 
@@ -139,9 +138,10 @@ class RingReader {
     // The next frame, copied out, or nothing when none came within `timeout_ms` (a pause for the caller to look at
     // its stop flag; nothing else is decided by it). One that is larger than the header's content, of another format, or whose
     // rows are not in its bytes comes without samples.
-    // `new_frame`: makes the frame that is read into.
-    std::optional<Frame> read(
-        int timeout_ms, const std::function<Frame()>& new_frame = [] { return Frame(); });
+    // `new_frame`: makes the frame that is read into; `copy_rows`: copies its samples, of which all else is set.
+    std::optional<Frame> read(int timeout_ms, const std::function<Frame()>& new_frame,
+                              const std::function<void(const std::byte*, Frame&)>& copy_rows);
+    std::optional<Frame> read(int timeout_ms);
     uint64_t watermark_ns() const;
     // Frames that found no room, of those before the last one that was read; once all are read, of all.
     uint64_t dropped() const;
@@ -160,7 +160,8 @@ class RingReader {
     struct State;
     explicit RingReader(std::unique_ptr<State>);
     uint64_t frames_waiting() const;
-    Frame take_frame(Frame frame);
+    Frame take_frame(Frame frame, const std::function<void(const std::byte*, Frame&)>& copy_rows);
+    void note_drops(uint64_t before_frame);
     std::unique_ptr<State> state_;
 };
 

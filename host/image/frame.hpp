@@ -24,6 +24,10 @@ enum class Cfa : uint32_t {
     rgb = 5,  // three interleaved samples a pixel, no mosaic
 };
 
+inline size_t sample_bytes(PixelFormat format) {
+    return format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+}
+
 inline int samples_per_pixel(Cfa cfa) {
     return cfa == Cfa::rgb ? 3 : 1;
 }
@@ -65,6 +69,11 @@ struct Frame {
     uint64_t tick = 0;            // trigger rise, board ticks
     uint32_t exposure_ticks = 0;  // trigger width
 };
+
+// Of one row, without what lies between rows.
+inline size_t row_samples(const Frame& frame) {
+    return frame.width * size_t(samples_per_pixel(frame.cfa));
+}
 
 // A dense float image, interleaved channels, rows top to bottom.
 struct Image {

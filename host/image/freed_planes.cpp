@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: MIT
-// A list of free planes for each size, of which a take has a few.
+// A list of free planes for each size, of which a take has a few; they lie side by side in slabs, which are as large as huge pages are of use.
 #include "image/freed_planes.hpp"
 
 #include <malloc.h>
+#include <sanitizer/asan_interface.h>
+#include <sys/mman.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <map>
 #include <mutex>
 #include <new>
@@ -14,6 +18,38 @@ namespace ols {
 namespace {
 
 constexpr std::align_val_t alignment{plane_alignment};
+constexpr size_t slab_bytes = 64 << 20, huge_page_bytes = 2 << 20;
+
+size_t rounded_up(size_t bytes, size_t unit) {
+    return (bytes + unit - 1) / unit * unit;
+}
+
+// Planes begin on cache lines, an odd number of these apart (row_band.cpp has why).
+size_t stride_of(size_t bytes) {
+    return (rounded_up(bytes, plane_alignment) / plane_alignment | 1) * plane_alignment;
+}
+
+struct Slab {
+    std::byte* memory;
+    size_t bytes, plane_bytes, planes, lent = 0;
+
+    std::byte* plane(size_t n) const { return memory + n * stride_of(plane_bytes); }
+};
+
+// Memory for so many planes, beginning on a huge page. Touched page by page it takes many times as long to come by: the kernel clears
+// each at its first use, and 156 planes that are written side by side are more pages than the processor remembers the places of.
+Slab map_slab(size_t plane_bytes, size_t planes) {
+    const size_t bytes = rounded_up(planes * stride_of(plane_bytes), huge_page_bytes);
+    void* const mapped = mmap(nullptr, bytes + huge_page_bytes, PROT_READ | PROT_WRITE,
+                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (mapped == MAP_FAILED) throw std::bad_alloc();
+    auto* const begin = static_cast<std::byte*>(mapped);
+    const size_t before = rounded_up(uintptr_t(begin), huge_page_bytes) - uintptr_t(begin);
+    if (before > 0) munmap(begin, before);
+    munmap(begin + before + bytes, huge_page_bytes - before);
+    (void)madvise(begin + before, bytes, MADV_HUGEPAGE);  // only quicker
+    return {begin + before, bytes, plane_bytes, planes};
+}
 
 // Never destroyed: planes may be let go of while the program ends.
 struct FreedPlanes {
@@ -21,6 +57,66 @@ struct FreedPlanes {
     bool keeps = false;
     size_t kept_bytes = 0;
     std::map<size_t, std::vector<void*>> by_size;
+    std::map<const void*, Slab> slabs;  // by where they begin
+
+    void* take(size_t bytes) {
+        if (bytes > size_t(PTRDIFF_MAX) / 2) throw std::bad_alloc();
+        std::vector<void*>& free = by_size[bytes];
+        if (free.empty()) add_slab(bytes, free);
+        void* const plane = free.back();
+        free.pop_back();
+        kept_bytes -= bytes;
+        ++slab_of(plane)->second.lent;
+        ASAN_UNPOISON_MEMORY_REGION(plane, bytes);  // in a checked build what is not lent is not to be touched
+        return plane;
+    }
+
+    // False for a plane that is of no slab: one that was made before planes were kept.
+    bool give_back(void* plane, size_t bytes) noexcept {
+        const auto slab = slab_of(plane);
+        if (slab == slabs.end()) return false;
+        ASAN_POISON_MEMORY_REGION(plane, bytes);
+        by_size[bytes].push_back(plane);  // has room (add_slab())
+        kept_bytes += bytes;
+        if (--slab->second.lent == 0 && kept_bytes > kept_bytes_max) unmap(slab);
+        return true;
+    }
+
+  private:
+    using SlabPlace = std::map<const void*, Slab>::iterator;
+
+    SlabPlace slab_of(const void* plane) {
+        auto slab = slabs.upper_bound(plane);
+        if (slab == slabs.begin()) return slabs.end();
+        --slab;
+        return static_cast<const std::byte*>(plane) < slab->second.memory + slab->second.bytes ? slab : slabs.end();
+    }
+
+    void add_slab(size_t bytes, std::vector<void*>& free) {
+        const size_t planes = std::max<size_t>(1, slab_bytes / stride_of(bytes));
+        size_t known = 0;
+        for (const auto& [begin, slab] : slabs) known += slab.plane_bytes == bytes ? slab.planes : 0;
+        free.reserve(known + planes);  // of all, so that giving back needs no memory
+        const Slab made = map_slab(bytes, planes);
+        try {
+            slabs.emplace(made.memory, made);
+        } catch (...) {
+            munmap(made.memory, made.bytes);
+            throw;
+        }
+        ASAN_POISON_MEMORY_REGION(made.memory, made.bytes);
+        for (size_t n = made.planes; n-- > 0;) free.push_back(made.plane(n));  // the first is taken first
+        kept_bytes += made.planes * bytes;
+    }
+
+    void unmap(SlabPlace place) {
+        const Slab slab = place->second;
+        std::erase_if(by_size[slab.plane_bytes], [&](const void* plane) { return slab_of(plane) == place; });
+        kept_bytes -= slab.planes * slab.plane_bytes;
+        slabs.erase(place);
+        ASAN_UNPOISON_MEMORY_REGION(slab.memory, slab.bytes);
+        munmap(slab.memory, slab.bytes);
+    }
 };
 
 FreedPlanes& freed() {
@@ -46,12 +142,7 @@ void* take_plane(size_t bytes) {
     if (bytes >= plane_bytes_min) {
         FreedPlanes& planes = freed();
         const std::lock_guard lock(planes.mutex);
-        if (const auto found = planes.by_size.find(bytes); found != planes.by_size.end() && !found->second.empty()) {
-            void* const plane = found->second.back();
-            found->second.pop_back();
-            planes.kept_bytes -= bytes;
-            return plane;
-        }
+        if (planes.keeps) return planes.take(bytes);
     }
     return ::operator new(bytes, alignment);
 }
@@ -60,14 +151,7 @@ void give_back_plane(void* plane, size_t bytes) noexcept {
     if (bytes >= plane_bytes_min) {
         FreedPlanes& planes = freed();
         const std::lock_guard lock(planes.mutex);
-        if (planes.keeps && planes.kept_bytes + bytes <= kept_bytes_max) {
-            try {
-                planes.by_size[bytes].push_back(plane);
-                planes.kept_bytes += bytes;
-                return;
-            } catch (const std::bad_alloc&) {  // no memory to remember it by
-            }
-        }
+        if (planes.give_back(plane, bytes)) return;
     }
     ::operator delete(plane, alignment);
 }

@@ -18,11 +18,10 @@ constexpr int backlog_max = 1100;
 
 // Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
 bool is_whole(const Frame& frame, const CameraConfig& config) {
-    const size_t sample_bytes = frame.format == PixelFormat::u16 ? sizeof(uint16_t) : sizeof(float);
+    const size_t bytes = sample_bytes(frame.format);
     return frame.width == uint32_t(config.width) && frame.height == uint32_t(config.height) &&
-           frame.cfa == config.cfa &&
-           frame.pitch_bytes >= frame.width * size_t(samples_per_pixel(frame.cfa)) * sample_bytes &&
-           frame.pitch_bytes % sample_bytes == 0 && frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
+           frame.cfa == config.cfa && frame.pitch_bytes >= row_samples(frame) * bytes &&
+           frame.pitch_bytes % bytes == 0 && frame.samples.size() >= size_t(frame.pitch_bytes) * frame.height;
 }
 
 }  // namespace
@@ -38,6 +37,7 @@ CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraRea
       place_(place),
       beat_(monitor.stages().add(fmt::format("camera {} reader", place))),
       dropped_before_(camera.counts().dropped) {
+    camera_.show_to(&look_);
     thread_ = std::thread([this] {
         const Status done = guarded("the camera cannot be read", [this] { return read(), Status(Done{}); });
         beat_.beat(StageActivity::ended);
@@ -48,6 +48,7 @@ CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraRea
 CameraReader::~CameraReader() {
     end_ = true;
     thread_.join();
+    camera_.show_to(nullptr);
 }
 
 void CameraReader::read() {
@@ -59,6 +60,7 @@ void CameraReader::read() {
         CameraState state = camera_.state();
         const bool is_live = state.kind == CameraState::live;
         const uint64_t watermark_ns = camera_.watermark_ns();
+        look_.forget();
         auto frame = camera_.read(pause_ms);
         count_drops();
         frames_behind_disk_ -= frames_behind_disk_ > 0;
@@ -69,7 +71,8 @@ void CameraReader::read() {
             continue;
         }
         options_.room->give_back_place();
-        frames_behind_disk_ = 0;
+        // Nothing is left in its buffers. What it dropped before this, it may tell with the next frame, as late as that comes.
+        frames_behind_disk_ = std::min(frames_behind_disk_, 1);
         queue_.push(CameraPause{watermark_ns, std::move(state), disk_drops_, host_drops_});
         if (!is_live) return;
     }
@@ -114,8 +117,9 @@ void CameraReader::enqueue(Frame frame) {
         news.witness.unfit = {Cause::wrong_size, "its size or format is not the stage's"};
     } else {
         take_levels(frame);
-        news.witness.summary = summarize_frame(frame, frame.black, config_.noise);
-        news.bits = bits_.read(frame);
+        look_.complete(frame);
+        news.witness.summary = look_.sums().summary(frame.black, config_.noise);
+        news.bits = bits_.read(frame, look_.hash());
     }
     news.frame = options_.room->adopt(std::move(frame));
     monitor_.change_camera(place_, [](CameraProgress& camera) { ++camera.frames_received; });

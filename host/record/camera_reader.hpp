@@ -13,6 +13,7 @@
 #include "record/board_log.hpp"
 #include "record/event_queue.hpp"
 #include "record/frame_bits.hpp"
+#include "record/frame_look.hpp"
 #include "record/frame_room.hpp"
 #include "record/record_monitor.hpp"
 #include "record/reorder.hpp"
@@ -68,6 +69,7 @@ class CameraReader {
     const CameraConfig& config_;
     const CameraReaderOptions options_;
     const BitsReader bits_;
+    FrameLook look_;
     RecordQueue& queue_;
     RecordMonitor& monitor_;
     const size_t place_;

@@ -11,6 +11,7 @@
 
 #include "exceptions.hpp"
 #include "record/frame_bits.hpp"
+#include "record/frame_look.hpp"
 #include "record/read_ahead.hpp"
 #include "record/recording_placer.hpp"
 #include "worker_threads.hpp"
@@ -58,8 +59,10 @@ class FrameReader {
             frame->stamp = stamps_[index];
             if (!frames_.facts().black) frame->black = float(camera_.black);
             if (!frames_.facts().white) frame->white = float(camera_.white);
-            read.summary = summarize_frame(*frame, black_counts_.value_or(frame->black), camera_.noise);
-            read.bits = bits_.read(*frame);
+            FrameLook look;
+            look.complete(*frame);
+            read.summary = look.sums().summary(black_counts_.value_or(frame->black), camera_.noise);
+            read.bits = bits_.read(*frame, look.hash());
             read.frame = std::make_shared<Frame>(std::move(*frame));
             return Done{};
         });

@@ -2,12 +2,16 @@
 // XXH3 over the samples; a count of those that noise can move.
 #include "record/frame_bits.hpp"
 
+#if defined(__x86_64__)
+#include <xxh_x86dispatch.h>  // by the vectors that this machine has; the values are the same
+#else
 #include <xxhash.h>
+#endif
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
+#include <new>
 #include <span>
 
 namespace ols {
@@ -28,20 +32,37 @@ size_t samples_in_range(std::span<const uint16_t> samples, uint16_t saturated) {
     return count;
 }
 
-struct StateRelease {
-    void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
-};
-
-uint64_t hash_rows(const Frame& frame, size_t row_bytes) {
-    if (frame.pitch_bytes == row_bytes) return XXH3_64bits(frame.samples.data(), row_bytes * frame.height);
-    const std::unique_ptr<XXH3_state_t, StateRelease> state(XXH3_createState());
-    XXH3_64bits_reset(state.get());
-    for (size_t y = 0; y < frame.height; ++y)
-        XXH3_64bits_update(state.get(), frame.samples.data() + y * frame.pitch_bytes, row_bytes);
-    return XXH3_64bits_digest(state.get());
+XXH3_state_t* state_of(void* state) {
+    return static_cast<XXH3_state_t*>(state);
 }
 
 }  // namespace
+
+RowHash::RowHash() : state_(XXH3_createState()) {
+    if (!state_) throw std::bad_alloc();
+    begin();
+}
+
+void RowHash::Release::operator()(void* state) const {
+    XXH3_freeState(state_of(state));
+}
+
+void RowHash::begin() {
+    XXH3_64bits_reset(state_of(state_.get()));
+}
+
+void RowHash::add(const Frame& frame, uint32_t rows, const std::byte* samples) {
+    const size_t pitch = frame.pitch_bytes, row_bytes = row_samples(frame) * sample_bytes(frame.format);
+    if (pitch == row_bytes) {
+        XXH3_64bits_update(state_of(state_.get()), samples, row_bytes * rows);
+        return;
+    }
+    for (size_t y = 0; y < rows; ++y) XXH3_64bits_update(state_of(state_.get()), samples + y * pitch, row_bytes);
+}
+
+uint64_t RowHash::value() const {
+    return XXH3_64bits_digest(state_of(state_.get()));
+}
 
 double equal_chance(double sigma_counts) {
     if (!(sigma_counts > 0)) return 1;
@@ -59,15 +80,13 @@ BitsReader::BitsReader(const CameraConfig& camera)
     : saturated_(uint16_t(std::clamp(camera.white, 0.0, 65535.0))),
       samples_needed_(samples_for(equal_chance(camera.noise.read_counts))) {}
 
-FrameBits BitsReader::read(const Frame& frame) const {
-    FrameBits bits;
+FrameBits BitsReader::read(const Frame& frame, uint64_t hash) const {
+    FrameBits bits{.hash = hash};
     if (frame.format != PixelFormat::u16) return bits;
-    const size_t row_samples = size_t(frame.width) * size_t(samples_per_pixel(frame.cfa));
-    bits.hash = hash_rows(frame, row_samples * sizeof(uint16_t));
     size_t moved = 0;
     for (size_t y = 0; y < frame.height && !bits.tells; ++y) {
         const auto* row = reinterpret_cast<const uint16_t*>(frame.samples.data() + y * frame.pitch_bytes);
-        moved += samples_in_range({row, row_samples}, saturated_);
+        moved += samples_in_range({row, row_samples(frame)}, saturated_);
         bits.tells = double(moved) > samples_needed_;  // of most frames in the first row
     }
     return bits;

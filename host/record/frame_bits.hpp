@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 
@@ -19,14 +20,29 @@ struct FrameBits {
     bool tells = false;
 };
 
+// The hash of a frame, by its rows in their order: XXH3 of 64 bits over the samples, without what lies between rows.
+class RowHash {
+  public:
+    RowHash();
+    void begin();
+    void add(const Frame& frame, uint32_t rows, const std::byte* samples);
+    uint64_t value() const;
+
+  private:
+    struct Release {
+        void operator()(void* state) const;
+    };
+    std::unique_ptr<void, Release> state_;
+};
+
 // Reads frames of one camera. Thread-safe.
 class BitsReader {
   public:
     // Of the camera its saturation and its read noise, the least that moves a sample, are used.
     explicit BitsReader(const CameraConfig& camera);
 
-    // Of a frame whose samples are complete. Samples of floats have no noise that is known here: they never tell.
-    FrameBits read(const Frame& frame) const;
+    // Of a frame whose samples are complete, with their hash. Samples of floats have no noise that is known here: they never tell.
+    FrameBits read(const Frame& frame, uint64_t hash) const;
 
   private:
     uint16_t saturated_;

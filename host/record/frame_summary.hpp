@@ -15,8 +15,23 @@ struct FrameSummary {
     float noise = 0;                          // standard deviation of a block mean in the dark
 };
 
-// Means over an 8 x 8 grid of equal blocks (the last row and column take what is left over). The frame is at least 8
-// pixels wide and high and its samples are complete. A sample that is not finite makes its block so.
+// Sums over an 8 x 8 grid of equal blocks (the last row and column take what is left over), of a frame of at least 8 pixels a side whose
+// rows come in their order. A sample that is not finite makes its block so.
+class BlockSums {
+  public:
+    BlockSums() = default;
+    explicit BlockSums(const Frame& frame);
+    void add(const Frame& frame, uint32_t first_row, uint32_t rows, const std::byte* samples);
+
+    // Of the means, once all rows were added.
+    FrameSummary summary(double black_counts, const NoiseModel& noise) const;
+
+  private:
+    static constexpr size_t grid = FrameSummary::grid;
+    size_t width_ = 0, height_ = 0, channels_ = 1;
+    std::array<double, grid * grid> sums_{};
+};
+
 FrameSummary summarize_frame(const Frame& frame, double black_counts, const NoiseModel& noise);
 
 // Whether no block differs from black by more than six standard deviations of its mean and `black_drift_counts`, what

@@ -7,9 +7,9 @@
 #include <map>
 
 #include "bench.hpp"
+#include "device/row_copy.hpp"
 #include "live_stage.hpp"
-#include "record/frame_bits.hpp"
-#include "record/frame_summary.hpp"
+#include "record/frame_look.hpp"
 #include "take/take.hpp"
 
 using namespace ols;
@@ -198,25 +198,28 @@ void measure_shares(Bench& bench, Live& live) {
                             {Estimate::none, recording->stage.lamps, 1, witness_step});
         sink += developer.develop(frames)->lamps[0][0];
     };
-    bench.measure({.name = "share of a cycle",
-                   .set_by = "nothing: it is the work for each of its frames, and for its target",
-                   .error_unit = "of none",
-                   .peer = "receive: copy out of the ring",
-                   .default_setting = "receive: copy out of the ring",
-                   .settings = {{"receive: copy out of the ring", each([](const Recording&, const Frame& frame) {
-                                     copy.samples.assign(frame.samples.begin(), frame.samples.end());
-                                 }),
-                                 exact},
-                                {"identify: block means", each([](const Recording& recording, const Frame& frame) {
-                                     sink += summarize_frame(frame, 64, recording.stage.cameras[0].noise).blocks[0];
-                                 }),
-                                 exact},
-                                {"identify: bits", each([](const Recording& recording, const Frame& frame) {
-                                     sink += double(BitsReader(recording.stage.cameras[0]).read(frame).hash);
-                                 }),
-                                 exact},
-                                {"develop: load, invert, variance, output", [=] { develop(0); }, exact},
-                                {"develop, and check by its witnesses", [=] { develop(5); }, exact}}});
+    bench.measure(
+        {.name = "share of a cycle",
+         .set_by = "nothing: it is the work for each of its frames, and for its target",
+         .error_unit = "of none",
+         .peer = "memory: the C library's copy",
+         .default_setting = "receive: copy, block means and hash",
+         .settings = {{"memory: the C library's copy", each([](const Recording&, const Frame& frame) {
+                           copy.samples.assign(frame.samples.begin(), frame.samples.end());
+                       }),
+                       exact},
+                      {"receive: copy, block means and hash", each([](const Recording& recording, const Frame& frame) {
+                           static RowCopy rows;
+                           static FrameLook look;
+                           copy.width = frame.width, copy.height = frame.height, copy.cfa = frame.cfa;
+                           copy.pitch_bytes = frame.pitch_bytes;
+                           rows.copy(frame.samples.data(), copy, &look);
+                           sink += look.sums().summary(64, recording.stage.cameras[0].noise).blocks[0];
+                           sink += double(look.hash());
+                       }),
+                       exact},
+                      {"develop: load, invert, variance, output", [=] { develop(0); }, exact},
+                      {"develop, and check by its witnesses", [=] { develop(5); }, exact}}});
 }
 
 }  // namespace

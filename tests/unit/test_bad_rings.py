@@ -30,7 +30,7 @@ HEADER_BYTES, META_BYTES = 192, 64
 SLOTS, STRIDE = 8, (META_BYTES + WIDTH * HEIGHT * 2 + 63) // 64 * 64
 # Where things are in the header, and as what.
 SLOTS_AT, STRIDE_AT, WIDTH_AT, HEIGHT_AT, FORMAT_AT, CFA_AT, BITS_AT = 8, 12, 16, 20, 24, 28, 32
-HEAD, WATERMARK, HEAD_FUTEX, CLOSED, STARTED, STARTED_NS, STARTED_HEAD = 64, 72, 88, 92, 96, 104, 112
+HEAD, WATERMARK, DROPPED, HEAD_FUTEX, CLOSED, STARTED, STARTED_NS, STARTED_HEAD = 64, 72, 80, 88, 92, 96, 104, 112
 TAIL, TAIL_FUTEX, ASKED, RUNNING = 128, 136, 140, 144
 
 
@@ -87,7 +87,7 @@ class Ring(threading.Thread):
             meta = {"camera": 0, "width": WIDTH, "height": HEIGHT, "format": 1, "cfa": 1, "pitch": 2 * WIDTH, "id": self.frame_id,
                     "time": 1_000_000 + 462_960 * self.frame_id, "black": 64.0, "white": 4095.0, "bytes": 2 * WIDTH * HEIGHT,
                     "dropped": 0}
-            meta |= self.odd.get("meta", {}) if is_odd else {}
+            meta |= self.odd.get("meta", {}) if is_odd and tail < self.odd.get("until", 1 << 64) else {}
             place = HEADER_BYTES + head % SLOTS * STRIDE
             if place + META_BYTES <= len(self.memory):
                 self.memory[place:place + META_BYTES] = struct.pack("<IIIIIIQQffQQ", *meta.values())
@@ -158,6 +158,9 @@ BROKEN = {
     "head back at 0": write("<Q", HEAD, 0),
     "head a slot too far": {"do": lambda ring: ring.put("<Q", HEAD, ring.get("<Q", HEAD) + SLOTS + 1)},
     "a head that jumps about": {"always": jump},
+    "2^64 - 1 frames dropped, of which no frame tells": write("<Q", DROPPED, (1 << 64) - 1),
+    "frames that tell of drops that the header does not": {"meta": {"dropped": 1}},
+    "drops that are taken back": {"do": lambda ring: ring.put("<Q", DROPPED, 5), "meta": {"dropped": 5}, "until": 30},
     "cut to nothing": cut(0),
     "cut to its header": cut(HEADER_BYTES),
     "cut within its header": cut(10),
@@ -178,7 +181,6 @@ BORNE = {
     "closed and open by turns": {"always": close_and_open},
     "a watermark of 2^64 - 1": write("<Q", WATERMARK, (1 << 64) - 1),
     "a watermark that goes back": {"always": lambda ring: ring.put("<Q", WATERMARK, 1)},
-    "dropped 2^64 - 1 frames": write("<Q", 80, (1 << 64) - 1),
     "grown": {"do": lambda ring: ring.file.truncate(1 << 24)},
 } | {f"frames whose {key} is {value}": {"meta": {key: value}} for key, value in (
     ("camera", 77), ("width", 0), ("width", 0xffffffff), ("width", WIDTH + 1), ("height", 0xffffffff), ("height", 0), ("height", HEIGHT + 1),

@@ -51,10 +51,12 @@ class ReadingFrom : public testing::Test {
                         0);
     }
     // The next frame; pauses before it are left out.
-    FrameNews next_frame() {
+    FrameNews next_frame() { return next<FrameNews>(); }
+    template <typename News>
+    News next() {
         for (;;) {
             RecordEvent event = *queue_.pop();
-            if (auto* news = std::get_if<FrameNews>(&event)) return std::move(*news);
+            if (auto* news = std::get_if<News>(&event)) return std::move(*news);
         }
     }
     void expose(int count) {
@@ -84,7 +86,11 @@ class ReadingFrom : public testing::Test {
 };
 
 using Reading = ReadingFrom<FakeCamera>;
-using ReadingLateTelling = ReadingFrom<LateTelling>;
+
+class ReadingLateTelling : public ReadingFrom<LateTelling> {
+  protected:
+    void drop_by_the_disk(bool waits);
+};
 
 }  // namespace
 
@@ -121,7 +127,9 @@ TEST_F(Reading, no_more_frames_are_held_than_may_be_and_what_is_dropped_meanwhil
     EXPECT_EQ(camera_.counts().missing_ids, 7u);
 }
 
-TEST_F(ReadingLateTelling, what_the_disk_held_up_is_the_disks_although_it_is_told_when_the_disk_has_long_gone_on) {
+// The disk holds the room, the camera drops five, the disk goes on, and only then is there a frame that tells of them. `waits`: whether
+// the reader found the camera empty before that frame.
+void ReadingLateTelling::drop_by_the_disk(bool waits) {
     disk_is_late_ = true;
     begin();
     expose(frames_max);
@@ -132,10 +140,33 @@ TEST_F(ReadingLateTelling, what_the_disk_held_up_is_the_disks_although_it_is_tol
     disk_is_late_ = false;
     held.clear();
     for (size_t n = 0; n < room; ++n) EXPECT_EQ(next_frame().witness.disk_drops, 0u);
+    if (waits) (void)next<CameraPause>();
     expose(1);
     const FrameNews after = next_frame();
     EXPECT_EQ(after.witness.disk_drops, 5u);
     EXPECT_EQ(after.witness.host_drops, 0u);
+}
+
+TEST_F(ReadingLateTelling, what_the_disk_held_up_is_the_disks_although_it_is_told_when_the_disk_has_long_gone_on) {
+    drop_by_the_disk(false);
+}
+
+TEST_F(ReadingLateTelling, also_when_nothing_came_for_a_while_before_it_was_told) {
+    drop_by_the_disk(true);
+}
+
+TEST_F(ReadingLateTelling, what_is_dropped_behind_the_frame_that_told_is_the_hosts_again) {
+    drop_by_the_disk(true);
+    std::vector<FrameNews> held;
+    expose(frames_max);
+    for (size_t n = 0; n < frames_max; ++n) held.push_back(next_frame());
+    expose(room + 2);
+    held.clear();
+    for (size_t n = 0; n < room; ++n) (void)next_frame();
+    expose(1);
+    const FrameNews after = next_frame();
+    EXPECT_EQ(after.witness.disk_drops, 5u);
+    EXPECT_EQ(after.witness.host_drops, 2u);
 }
 
 // Neither a UVC camera nor most of GigE Vision tell where they saturate or where black is.

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include "image/plane.hpp"
 
@@ -51,8 +52,34 @@ TEST(FreedPlanes, beyond_the_bound_go_back) {
     for (void* plane : again) give_back_plane(plane, huge);
 }
 
+TEST(FreedPlanes, that_were_made_before_they_were_kept_go_back_to_where_they_came_from) {
+    auto* const small = static_cast<char*>(take_plane(plane_bytes_min - 1));  // as those are: from the heap
+    small[0] = 1;
+    give_back_plane(small, plane_bytes_min);
+    void* const next = take_plane(plane_bytes_min);
+    EXPECT_NE(next, small);
+    give_back_plane(next, plane_bytes_min);
+}
+
+TEST(FreedPlanes, do_not_overlap_and_keep_what_is_written_in_them) {
+    (void)keep_freed_planes();
+    for (const size_t size : {plane_bytes_min, plane_bytes_min + 4, size_t(640 * 480 * 4), size_t(65 << 20)}) {
+        constexpr int planes = 60;
+        std::vector<unsigned char*> lent;
+        for (int n = 0; n < planes; ++n) lent.push_back(static_cast<unsigned char*>(take_plane(size)));
+        for (int n = 0; n < planes; ++n) lent[n][0] = lent[n][size / 2] = lent[n][size - 1] = (unsigned char)n;
+        for (int n = 0; n < planes; ++n) {
+            EXPECT_EQ(uintptr_t(lent[n]) % plane_alignment, 0u);
+            ASSERT_TRUE(lent[n][0] == n && lent[n][size / 2] == n && lent[n][size - 1] == n) << size;
+        }
+        for (unsigned char* plane : lent) give_back_plane(plane, size);
+    }
+}
+
 TEST(FreedPlanes, a_plane_of_more_bytes_than_there_are_is_an_exception) {
+    (void)keep_freed_planes();
     EXPECT_THROW((void)PlaneAllocator<float>().allocate(size_t(-1) / 2), std::bad_alloc);
+    EXPECT_THROW((void)PlaneAllocator<float>().allocate(size_t(-1) / 4), std::bad_alloc);
 }
 
 }  // namespace
