@@ -14,6 +14,8 @@ struct FrameRooms {
     std::vector<std::shared_ptr<FrameRoom>> of_camera;  // of the stage's, in their order
     std::shared_ptr<SpillFile> spill;                   // theirs; null without
 
+    // Null where there are no rooms, as for frames that lie in files.
+    std::shared_ptr<FrameRoom> room_of(size_t camera) const { return of_camera.empty() ? nullptr : of_camera[camera]; }
     MemoryReport report() const;
 };
 
