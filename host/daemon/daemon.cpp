@@ -8,6 +8,7 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <filesystem>
@@ -55,18 +56,23 @@ class Signals {
     }
 };
 
-// Where it differs from what was said last.
-void notify_state(const Snapshot& now) {
-    static std::string said;
-    std::string text = state_name(now.state);
-    if (!now.fault.empty()) text += ": " + now.fault;
-    if (now.take) text += ": " + now.take->name;
-    for (char& c : text)
-        if (c == '\n') c = ' ';
-    if (text == said) return;
-    sd_notifyf(0, "STATUS=%s", text.c_str());
-    said = std::move(text);
-}
+// The state as `systemctl status` shows it.
+class ShownState {
+  public:
+    // Where it differs from what was said last.
+    void show(const Snapshot& now) {
+        std::string text = state_name(now.state);
+        if (!now.fault.empty()) text += ": " + now.fault;
+        if (now.take) text += ": " + now.take->name;
+        std::ranges::replace(text, '\n', ' ');
+        if (text == said_) return;
+        sd_notifyf(0, "STATUS=%s", text.c_str());
+        said_ = std::move(text);
+    }
+
+  private:
+    std::string said_;
+};
 
 Status check_folders(const DaemonSetup& setup) {
     const auto check = [&](const std::string& folder, const char* key) -> Status {
@@ -88,17 +94,17 @@ Status check_folders(const DaemonSetup& setup) {
 }
 
 // The first signal ends the light and lets what is held be finished; a second one ends at once.
-void shut_down(Conductor& conductor, Signals& signals) {
+void shut_down(Conductor& conductor, Signals& signals, ShownState& shown) {
     conductor.shut_down([&] {
         if (conductor.follow(stuck_after).empty())
             sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%llu\nWATCHDOG=1", static_cast<unsigned long long>(ending_extension_us));
-        notify_state(conductor.snapshot());
+        shown.show(conductor.snapshot());
         const int signal = signals.wait(0);
         if (signal == SIGTERM || signal == SIGINT) ::_exit(1);
     });
 }
 
-void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
+void run_until_told(Conductor& conductor, EventLog& events, Signals& signals, ShownState& shown) {
     bool is_stuck = false, reload_waits = false;
     for (;;) {
         const int signal = signals.wait(look_ms);
@@ -118,7 +124,7 @@ void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
                     stuck, stuck_after.count()));
         is_stuck = !stuck.empty();
         if (!is_stuck) sd_notify(0, "WATCHDOG=1");
-        notify_state(now);
+        shown.show(now);
     }
 }
 
@@ -152,10 +158,11 @@ Status run_daemon(const DaemonOptions& options) {
     if (http) where += fmt::format(" and http://127.0.0.1:{} (token in '{}')", setup.http_port, token_file_of(setup));
     events.add(EventKind::daemon_started, options.program_version + " listens at " + where);
     sd_notify(0, "READY=1");
-    run_until_told(conductor, events, signals);
+    ShownState shown;
+    run_until_told(conductor, events, signals, shown);
     sd_notify(0, "STOPPING=1");
     events.add(EventKind::daemon_stopping, "told to end: the light goes out, and what was recorded is finished");
-    shut_down(conductor, signals);
+    shut_down(conductor, signals, shown);
     return Done{};
 }
 
