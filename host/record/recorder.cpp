@@ -49,7 +49,7 @@ class CameraTake {
           sequence_(sequence),
           stop_(stop),
           monitor_(monitor),
-          beat_(monitor.stages().add(fmt::format("camera {} identification", place))),
+          beat_(monitor.stages().add(fmt::format("camera {} identification", recorded.index))),
           room_(std::move(room)),
           counts_before_(recorded.camera.counts()),
           started_(recorded.camera, room_, stop) {
@@ -66,10 +66,10 @@ class CameraTake {
     uint64_t arrivals() const { return reader_->arrivals(); }
 
     void begin(const CameraConfig& config) {
-        recording_.emplace(sequence_, place_, recorded_.sink, *started_.time_ns, stop_, monitor_);
+        recording_.emplace(sequence_, recorded_, place_, *started_.time_ns, stop_, monitor_);
         reader_.emplace(recorded_.camera, config,
                         CameraReaderOptions{recorded_.black_counts, room_, recorded_.sink.waits_for_disk}, queue_,
-                        monitor_, place_);
+                        monitor_, recorded_.index);
         thread_ = std::thread([this] {
             failure_ = guarded("its frames cannot be taken", [this] { return identify(), Status(Done{}); });
             has_failed_ = !failure_.ok();
