@@ -11,7 +11,7 @@ namespace ols {
 
 struct CameraNeeds {
     double frames_per_s = 0;   // that its trigger line asks for, on average over the cycle
-    uint64_t frame_bytes = 0;  // in memory and spilled: a 16-bit word a sample
+    uint64_t frame_bytes = 0;  // in memory and spilled
     // On its link, at most: whole bytes a sample, as a camera without packed formats sends it.
     uint64_t link_frame_bytes = 0;
     uint64_t target_bytes = 0;  // of an archive, at most

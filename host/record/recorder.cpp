@@ -122,7 +122,7 @@ Result<std::shared_ptr<FrameRoom>> room_of(const RecordedCamera& recorded, const
     if (recorded.sink.room) return recorded.sink.room;
     FrameRoom::Options options;
     options.frames_max = frames_in_flight(sequence);
-    options.frame_bytes = frame_bytes(stage.cameras[recorded.index]);
+    options.frame_bytes = stage.cameras[recorded.index].frame_bytes();
     return FrameRoom::create(options);
 }
 
@@ -156,10 +156,6 @@ Status start_armed_board(Board& board) {
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
     if (const Status armed = arm_board(board, sequence, stage); !armed.ok()) return armed;
     return start_armed_board(board);
-}
-
-size_t frame_bytes(const CameraConfig& camera) {
-    return size_t(camera.width) * size_t(camera.height) * size_t(samples_per_pixel(camera.cfa)) * sizeof(uint16_t);
 }
 
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {

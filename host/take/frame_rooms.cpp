@@ -58,7 +58,7 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
     options.frames_max = least;
     if (memory.ram_bytes > 0) {
         uint64_t bytes = 0;  // of a frame of each camera
-        for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(frame_bytes(camera));
+        for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(camera.frame_bytes());
         const uint64_t frames = memory.ram_bytes / bytes;
         if (frames < least)
             return fail(
@@ -70,7 +70,7 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
         options.is_touched = true;
     }
     for (const CameraConfig& camera : take.stage.cameras) {
-        options.frame_bytes = frame_bytes(camera);
+        options.frame_bytes = camera.frame_bytes();
         auto room = FrameRoom::create(options);
         if (!room.ok()) return room.error();
         rooms.of_camera.push_back(std::move(*room));
