@@ -8,6 +8,7 @@
 #include <csignal>
 
 #include "doctor/disk_speed.hpp"
+#include "image/disk_room.hpp"
 #include "made_up_machine.hpp"
 #include "steady_clock.hpp"
 
