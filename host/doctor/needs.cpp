@@ -36,11 +36,16 @@ double StageNeeds::archive_bytes_per_s() const {
     });
 }
 
+double StageNeeds::held_bytes() const {
+    return std::accumulate(cameras.begin(), cameras.end(), 0.0, [this](double sum, const CameraNeeds& camera) {
+        return sum + double(frames_held) * double(camera.frame_bytes);
+    });
+}
+
 StageNeeds needs_of(const StageConfig& stage, const Sequence& sequence, double take_s, double target_rate_hz,
                     const std::vector<uint64_t>& target_bytes) {
     StageNeeds needs;
-    needs.cycle_s = double(sequence.cycle_ticks()) / double(tick_hz);
-    needs.targets_per_s = target_rate_hz > 0 ? target_rate_hz : 1 / needs.cycle_s;
+    needs.targets_per_s = target_rate_hz > 0 ? target_rate_hz : double(tick_hz) / double(sequence.cycle_ticks());
     needs.take_s = take_s;
     for (size_t camera = 0; camera < stage.cameras.size(); ++camera) {
         needs.cameras.push_back(needs_of(stage.cameras[camera], sequence));

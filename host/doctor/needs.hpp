@@ -22,12 +22,13 @@ struct CameraNeeds {
 
 struct StageNeeds {
     std::vector<CameraNeeds> cameras;  // the stage's
-    double cycle_s = 0;
-    double targets_per_s = 0;  // of each camera
-    double take_s = 0;         // how long a take is to be
+    double targets_per_s = 0;          // of each camera
+    double take_s = 0;                 // how long a take is to be
+    uint64_t frames_held = 0;          // of each camera, that a take has in memory whatever happens
 
     double raw_bytes_per_s() const;      // of all cameras
     double archive_bytes_per_s() const;  // of all cameras, while it is recorded
+    double held_bytes() const;           // of all cameras
 };
 
 // `target_rate_hz` 0: a target a cycle, as `stagectl run` without --fps makes them. `target_bytes`: of each camera's targets, in their

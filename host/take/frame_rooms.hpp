@@ -19,6 +19,9 @@ struct FrameRooms {
     MemoryReport report() const;
 };
 
+// Frames of each camera that the take has room for whatever happens: those that developing must hold at once.
+size_t frames_held(const TakeDescription& take, const std::vector<TakeOutput>& outputs);
+
 // Errors: memory that is too small for what developing must hold at once, or not to be had; a folder that nothing can be spilled to.
 Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vector<TakeOutput>& outputs);
 
