@@ -74,25 +74,6 @@ class ShownState {
     std::string said_;
 };
 
-Status check_folders(const DaemonSetup& setup) {
-    const auto check = [&](const std::string& folder, const char* key) -> Status {
-        std::error_code error;
-        std::filesystem::create_directories(folder, error);
-        if (error || ::access(folder.c_str(), W_OK | X_OK) != 0)
-            return fail(
-                fmt::format("[daemon] {} = '{}' is no folder that this user may write to: make it, and give it to the "
-                            "daemon's user",
-                            key, folder));
-        return Done{};
-    };
-    if (const Status takes = check(setup.takes, "takes"); !takes) return takes;
-    if (!setup.spill.empty())
-        if (const Status spill = check(setup.spill, "spill"); !spill) return spill;
-    std::error_code ignored;
-    std::filesystem::create_directories(std::filesystem::path(setup.socket).parent_path(), ignored);
-    return Done{};
-}
-
 // The first signal ends the light and lets what is held be finished; a second one ends at once.
 void shut_down(Conductor& conductor, Signals& signals, ShownState& shown) {
     conductor.shut_down([&] {
@@ -133,16 +114,17 @@ void run_until_told(Conductor& conductor, EventLog& events, Signals& signals, Sh
 Status check_configuration(const std::string& path) {
     const auto stage = read_stage(path);
     if (!stage) return stage.error();
-    return check_words(stage->daemon, *stage);
+    return check_daemon(*stage, false);
 }
 
 Status run_daemon(const DaemonOptions& options) {
     Signals signals;
     auto stage = read_stage(options.config_path);
     if (!stage) return stage.error();
-    if (const Status fits = check_words(stage->daemon, *stage); !fits) return fits;
+    if (const Status fits = check_daemon(*stage, true); !fits) return fits;
     const DaemonSetup setup = stage->daemon;
-    if (const Status there = check_folders(setup); !there) return there;
+    std::error_code ignored;
+    std::filesystem::create_directories(std::filesystem::path(setup.socket).parent_path(), ignored);
     EventLog events(make_log());
     Conductor conductor(options.config_path, std::move(*stage), events);
     Api api(conductor, events, options.program_version);
