@@ -10,6 +10,7 @@
 #include "daemon/preview.hpp"
 #include "daemon/progress_json.hpp"
 #include "image/base64.hpp"
+#include "image/disk_room.hpp"
 #include "image/json_object.hpp"
 
 namespace ols {
@@ -100,7 +101,7 @@ json Api::present_state() const {
     json allowed = json::array();
     for (const Method& method : methods())
         if (method.is_allowed(now.state)) allowed.push_back(method.name);
-    const auto free = bytes_free_in(stage.daemon.takes);
+    const auto disk = room_of(stage.daemon.takes);
     return {{"event_number", number},
             {"state", state_name(now.state)},
             {"allowed", allowed},
@@ -113,7 +114,7 @@ json Api::present_state() const {
             {"take", now.take ? progress_json(*now.take) : json()},
             {"last_take", now.last_take},
             {"takes_folder", stage.daemon.takes},
-            {"disk_bytes_free", free ? json(*free) : json()}};
+            {"disk_bytes_free", disk ? json(disk->free_bytes) : json()}};
 }
 
 json Api::version() const {

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,6 +12,7 @@
 #include <cstring>
 #include <utility>
 
+#include "device/unix_address.hpp"
 #include "image/json_object.hpp"
 #include "stage/daemon_setup.hpp"
 
@@ -24,13 +24,10 @@ std::string default_socket() {
 }
 
 Result<DaemonClient> DaemonClient::connect(const std::string& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    if (path.empty() || path.size() >= sizeof address.sun_path)
-        return fail("'" + path + "' is no path of a socket: at most 107 bytes");
-    std::memcpy(address.sun_path, path.c_str(), path.size());
+    const auto address = unix_address(path);
+    if (!address) return address.error();
     DaemonClient client(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), path);
-    if (client.fd_ < 0 || ::connect(client.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (client.fd_ < 0 || ::connect(client.fd_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
         const int error = errno;
         const char* const hint = error == EACCES
                                      ? "be a member of the group that may use it ([daemon] socket_group)"

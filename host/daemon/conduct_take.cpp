@@ -243,19 +243,7 @@ void Conductor::calibrate_now(CardOptions card, const Reply& reply) {
     if (!measured) return refuse(stop_.wanted ? fail(measured.error().message + ": " + stop_.why()) : measured.error());
     if (const Status kept = write_calibration(folder, card.camera, measured->calibration, measured->record); !kept)
         return refuse(kept.error());
-    events_.add(
-        EventKind::calibration_finished,
-        fmt::format("camera {}: {} frames; black {:.2f} counts, flat {:.4f} counts a microsecond, card at {:.0f} % of "
-                    "the range at most",
-                    card.camera, measured->record.frames, measured->black_mean, measured->flat_mean,
-                    measured->brightest * 100),
-        {{"calibration", folder},
-         {"camera", card.camera},
-         {"frames", measured->record.frames},
-         {"exposure_us", measured->record.card_exposure_us},
-         {"black_counts", measured->black_mean},
-         {"flat_counts_per_us", measured->flat_mean},
-         {"brightest_share", measured->brightest}});
+    events_.add(EventKind::calibration_finished, measured->to_text(), measured->to_json(folder));
     change_state(DaemonState::idle);
 }
 

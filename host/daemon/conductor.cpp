@@ -244,8 +244,8 @@ Conductor::Outcome Conductor::reload() {
     return run("reload", "a reading of the configuration", [this](const Reply& reply) {
         auto read = read_stage(config_path_);
         Status fits = Done{};
-        if (read) fits = check_words(read->daemon, *read);
-        if (read && fits) fits = check_lasting(stage_.daemon, read->daemon);
+        if (read) fits = check_lasting(stage_.daemon, read->daemon);
+        if (read && fits) fits = check_daemon(*read, true);
         if (!read || !fits) {
             const Error& wrong = read ? fits.error() : read.error();
             events_.add(EventKind::configuration_wrong, wrong.message + "; the configuration before stays in force");

@@ -8,6 +8,7 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <filesystem>
@@ -55,50 +56,36 @@ class Signals {
     }
 };
 
-// Where it differs from what was said last.
-void notify_state(const Snapshot& now) {
-    static std::string said;
-    std::string text = state_name(now.state);
-    if (!now.fault.empty()) text += ": " + now.fault;
-    if (now.take) text += ": " + now.take->name;
-    for (char& c : text)
-        if (c == '\n') c = ' ';
-    if (text == said) return;
-    sd_notifyf(0, "STATUS=%s", text.c_str());
-    said = std::move(text);
-}
+// The state as `systemctl status` shows it.
+class ShownState {
+  public:
+    // Where it differs from what was said last.
+    void show(const Snapshot& now) {
+        std::string text = state_name(now.state);
+        if (!now.fault.empty()) text += ": " + now.fault;
+        if (now.take) text += ": " + now.take->name;
+        std::ranges::replace(text, '\n', ' ');
+        if (text == said_) return;
+        sd_notifyf(0, "STATUS=%s", text.c_str());
+        said_ = std::move(text);
+    }
 
-Status check_folders(const DaemonSetup& setup) {
-    const auto check = [&](const std::string& folder, const char* key) -> Status {
-        std::error_code error;
-        std::filesystem::create_directories(folder, error);
-        if (error || ::access(folder.c_str(), W_OK | X_OK) != 0)
-            return fail(
-                fmt::format("[daemon] {} = '{}' is no folder that this user may write to: make it, and give it to the "
-                            "daemon's user",
-                            key, folder));
-        return Done{};
-    };
-    if (const Status takes = check(setup.takes, "takes"); !takes) return takes;
-    if (!setup.spill.empty())
-        if (const Status spill = check(setup.spill, "spill"); !spill) return spill;
-    std::error_code ignored;
-    std::filesystem::create_directories(std::filesystem::path(setup.socket).parent_path(), ignored);
-    return Done{};
-}
+  private:
+    std::string said_;
+};
 
 // The first signal ends the light and lets what is held be finished; a second one ends at once.
-void shut_down(Conductor& conductor, Signals& signals) {
+void shut_down(Conductor& conductor, Signals& signals, ShownState& shown) {
     conductor.shut_down([&] {
         if (conductor.follow(stuck_after).empty())
             sd_notifyf(0, "EXTEND_TIMEOUT_USEC=%llu\nWATCHDOG=1", static_cast<unsigned long long>(ending_extension_us));
-        notify_state(conductor.snapshot());
+        shown.show(conductor.snapshot());
         const int signal = signals.wait(0);
         if (signal == SIGTERM || signal == SIGINT) ::_exit(1);
     });
 }
 
-void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
+void run_until_told(Conductor& conductor, EventLog& events, Signals& signals, ShownState& shown) {
     bool is_stuck = false, reload_waits = false;
     for (;;) {
         const int signal = signals.wait(look_ms);
@@ -118,7 +105,7 @@ void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
                     stuck, stuck_after.count()));
         is_stuck = !stuck.empty();
         if (!is_stuck) sd_notify(0, "WATCHDOG=1");
-        notify_state(now);
+        shown.show(now);
     }
 }
 
@@ -127,16 +114,17 @@ void run_until_told(Conductor& conductor, EventLog& events, Signals& signals) {
 Status check_configuration(const std::string& path) {
     const auto stage = read_stage(path);
     if (!stage) return stage.error();
-    return check_words(stage->daemon, *stage);
+    return check_daemon(*stage, false);
 }
 
 Status run_daemon(const DaemonOptions& options) {
     Signals signals;
     auto stage = read_stage(options.config_path);
     if (!stage) return stage.error();
-    if (const Status fits = check_words(stage->daemon, *stage); !fits) return fits;
+    if (const Status fits = check_daemon(*stage, true); !fits) return fits;
     const DaemonSetup setup = stage->daemon;
-    if (const Status there = check_folders(setup); !there) return there;
+    std::error_code ignored;
+    std::filesystem::create_directories(std::filesystem::path(setup.socket).parent_path(), ignored);
     EventLog events(make_log());
     Conductor conductor(options.config_path, std::move(*stage), events);
     Api api(conductor, events, options.program_version);
@@ -152,10 +140,11 @@ Status run_daemon(const DaemonOptions& options) {
     if (http) where += fmt::format(" and http://127.0.0.1:{} (token in '{}')", setup.http_port, token_file_of(setup));
     events.add(EventKind::daemon_started, options.program_version + " listens at " + where);
     sd_notify(0, "READY=1");
-    run_until_told(conductor, events, signals);
+    ShownState shown;
+    run_until_told(conductor, events, signals, shown);
     sd_notify(0, "STOPPING=1");
     events.add(EventKind::daemon_stopping, "told to end: the light goes out, and what was recorded is finished");
-    shut_down(conductor, signals);
+    shut_down(conductor, signals, shown);
     return Done{};
 }
 

@@ -13,7 +13,7 @@ struct DaemonOptions {
     std::string program_version;
 };
 
-// What is wrong with the configuration, with file and line.
+// What is wrong with the configuration, with file and line; folders are looked at with this user's rights, and none is made.
 Status check_configuration(const std::string& path);
 
 // Runs until SIGTERM or SIGINT: then the light goes out, what was recorded is developed and written, and it returns. A second one

@@ -2,13 +2,9 @@
 // Sizes of files that are not there yet.
 #include "daemon/disk_forecast.hpp"
 
-#include <fmt/format.h>
-#include <sys/statvfs.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
+#include "image/disk_room.hpp"
 #include "take/target_plan.hpp"
 
 namespace ols {
@@ -37,24 +33,16 @@ uint64_t target_bytes_max(const Sequence& sequence, const StageConfig& stage, si
     return pixels * bytes_a_pixel + overhead_bytes;
 }
 
-Result<uint64_t> bytes_free_in(const std::string& folder) {
-    struct statvfs disk {};
-    if (statvfs(folder.c_str(), &disk) != 0)
-        return fail(fmt::format("the disk of '{}' cannot be asked for its room: {}: check that the folder is there",
-                                folder, std::strerror(errno)));
-    return uint64_t(disk.f_bavail) * disk.f_frsize;
-}
-
 Result<DiskForecast> forecast_disk(const std::string& folder, const Sequence& sequence, const StageConfig& stage,
                                    const TakeTargets& targets, bool single_float, uint64_t bytes_reserve) {
-    const auto free = bytes_free_in(folder);
-    if (!free) return free.error();
-    DiskForecast forecast{0, *free, bytes_reserve, 0, 0};
+    const auto disk = room_of(folder);
+    if (!disk) return disk.error();
+    DiskForecast forecast{0, disk->free_bytes, bytes_reserve, 0, 0};
     const uint64_t count = plan_targets(sequence, {}, targets).size();
     for (size_t camera = 0; camera < stage.cameras.size(); ++camera)
         forecast.bytes_needed += count * target_bytes_max(sequence, stage, camera, targets, single_float);
     forecast.seconds = double(sequence.config.cycles) * double(sequence.cycle_ticks()) / double(tick_hz);
-    const double room = double(*free > bytes_reserve ? *free - bytes_reserve : 0);
+    const double room = double(disk->free_bytes - std::min(disk->free_bytes, bytes_reserve));
     if (forecast.bytes_needed > 0) forecast.seconds_that_fit = forecast.seconds * room / double(forecast.bytes_needed);
     return forecast;
 }

@@ -31,7 +31,4 @@ struct DiskForecast {
 Result<DiskForecast> forecast_disk(const std::string& folder, const Sequence& sequence, const StageConfig& stage,
                                    const TakeTargets& targets, bool single_float, uint64_t bytes_reserve);
 
-// Bytes that this user may still write where the folder lies. Error: it cannot be asked.
-Result<uint64_t> bytes_free_in(const std::string& folder);
-
 }  // namespace ols

@@ -5,6 +5,7 @@
 #include "daemon/conductor.hpp"
 #include "daemon/progress_json.hpp"
 #include "image/bytes_text.hpp"
+#include "image/disk_room.hpp"
 
 namespace ols {
 
@@ -58,16 +59,16 @@ void Conductor::tell_progress(const TakeProgress& progress, Clock::time_point no
 void Conductor::watch_disk(const TakeProgress& progress) {
     if (followed_.take->dark_is_told || followed_.take->target_bytes == 0) return;
     const StageConfig stage = this->stage();
-    const auto free = bytes_free_in(stage.daemon.takes);
+    const auto disk = room_of(stage.daemon.takes);
     uint64_t waiting = 0;
     for (const OutputProgress& output : progress.outputs) waiting += output.targets_waiting + 2;
     const uint64_t reserve = uint64_t(stage.daemon.reserve_mb) * 1'000'000;
-    if (!free) return end_take(EventKind::disk_full, free.error().message);
-    if (*free > reserve + waiting * followed_.take->target_bytes) return;
+    if (!disk) return end_take(EventKind::disk_full, disk.error().message);
+    if (disk->free_bytes > reserve + waiting * followed_.take->target_bytes) return;
     end_take(
         EventKind::disk_full,
         fmt::format("the disk of '{}' has {} left and {} are kept: the take ends here, and what it has is finished",
-                    stage.daemon.takes, bytes_text(double(*free)), bytes_text(double(reserve))));
+                    stage.daemon.takes, bytes_text(double(disk->free_bytes)), bytes_text(double(reserve))));
 }
 
 }  // namespace ols

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/disk_forecast.hpp"
+#include "image/disk_room.hpp"
 
 namespace ols {
 
@@ -110,9 +110,9 @@ std::string metrics_text(const Snapshot& now, const DaemonSetup& setup, const Ev
     if (now.take) totals.add(now.take->monitor.progress());
     add_takes(page, totals);
     add_running(page, now);
-    if (const auto free = bytes_free_in(setup.takes)) {
+    if (const auto disk = room_of(setup.takes)) {
         page.family("stagectl_takes_disk_free_bytes", "gauge", "Free for takes, the reserve included.");
-        page.value(*free);
+        page.value(disk->free_bytes);
     }
     add_process(page);
     return std::move(page).text();

@@ -3,6 +3,7 @@
 #include "daemon/take_plan.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -22,6 +23,20 @@ Status check_word(const DaemonSetup& setup, const char* key, const std::string& 
     std::string all;
     for (const std::string& one : known) all += (all.empty() ? "" : ", ") + one;
     return fail(fmt::format("{} is '{}', which is none of: {}", setup.places.at(key), word, all));
+}
+
+Status check_folder(const DaemonSetup& setup, const char* key, const fs::path& folder, bool makes_it) {
+    std::error_code error;
+    fs::path there = fs::absolute(folder, error);
+    if (makes_it)
+        fs::create_directories(there, error);
+    else  // it would be made in the last folder of its path that is there
+        while (there.has_relative_path() && !fs::exists(there, error)) there = there.parent_path();
+    if (fs::is_directory(there, error) && ::access(there.c_str(), W_OK | X_OK) == 0) return Done{};
+    return fail(
+        fmt::format("{} is '{}', which is no folder that this user may write to: make it, and give it to the "
+                    "daemon's user",
+                    setup.places.at(key), folder.string()));
 }
 
 TakeChoices choices_of(const TakeRequest& request, const DaemonSetup& setup) {
@@ -70,7 +85,8 @@ Result<SequenceConfig> find_sequence(const std::string& name, const DaemonSetup&
     return config;
 }
 
-Status check_words(const DaemonSetup& setup, const StageConfig& stage) {
+Status check_daemon(const StageConfig& stage, bool makes_folders) {
+    const DaemonSetup& setup = stage.daemon;
     if (const Status s = check_word(setup, "quality", setup.quality, motion_quality_names()); !s) return s;
     if (const Status s = check_word(setup, "estimate", setup.estimate, estimate_names()); !s) return s;
     if (const Status s = check_word(setup, "fill", setup.fill, {"none", "neighbours"}); !s) return s;
@@ -79,7 +95,8 @@ Status check_words(const DaemonSetup& setup, const StageConfig& stage) {
     if (!sequence) return fail(setup.places.at("sequence") + ": " + sequence.error().message);
     if (const auto compiled = compile_sequence(*sequence, stage); !compiled)
         return fail(setup.places.at("sequence") + ": " + compiled.error().message);
-    return Done{};
+    if (const Status s = check_folder(setup, "takes", setup.takes, makes_folders); !s) return s;
+    return setup.spill.empty() ? Done{} : check_folder(setup, "spill", setup.spill, makes_folders);
 }
 
 Result<TakePlan> plan_take(const TakeRequest& request, const std::string& sequence_name, const StageConfig& stage) {

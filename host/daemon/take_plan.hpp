@@ -33,8 +33,9 @@ struct TakeRequest {
 // could lead out of the folder, none of both, what is wrong with the file.
 Result<SequenceConfig> find_sequence(const std::string& name, const DaemonSetup& setup);
 
-// The words of [daemon] that other rooms know: the error names file and line.
-Status check_words(const DaemonSetup& setup, const StageConfig& stage);
+// What of [daemon] is not its reader's to know: words of other rooms, and whether this user may write to its folders. With
+// `makes_folders` those that are not there are made. The error names file and line.
+Status check_daemon(const StageConfig& stage, bool makes_folders);
 
 struct TakePlan {
     Sequence sequence;

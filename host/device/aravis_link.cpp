@@ -21,7 +21,7 @@ namespace {
 
 // Buffers: a fifth of a second and more of small frames, and never more memory than this.
 constexpr size_t buffers_bytes = size_t(256) << 20;
-constexpr size_t buffers_min = 16, buffers_max = 1024;
+constexpr size_t buffers_min = 16, buffers_max = Camera::buffers_max;
 // Packets of a frame that may be asked for again, by how many it has. Most of the first frame may be lost: the library enlarges its
 // socket when that one's first packet has come.
 constexpr double asked_again = 1;

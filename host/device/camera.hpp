@@ -53,6 +53,8 @@ struct CameraState {
 class Camera {
   public:
     static constexpr int device_patience_ms = 60'000;
+    // Buffers of a driver, at most; how many a ring has is its writer's to say.
+    static constexpr int buffers_max = 1024;
 
     virtual ~Camera() = default;
 

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,18 +12,17 @@
 #include <cstring>
 #include <utility>
 
+#include "device/unix_address.hpp"
+
 namespace ols {
 
 Result<UnixSocket> UnixSocket::connect(const std::string& path, const std::string& what, const Deadline& deadline) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    if (path.empty() || path.size() >= sizeof address.sun_path)
-        return fail(fmt::format("socket path '{}' must have 1 to {} characters", path, sizeof address.sun_path - 1));
-    std::memcpy(address.sun_path, path.c_str(), path.size());
+    const auto address = unix_address(path);
+    if (!address) return address.error();
     const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) return fail(fmt::format("cannot make a socket: {}", std::strerror(errno)));
     UnixSocket made(fd, fmt::format("{} at '{}'", what, path));
-    while (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    while (::connect(fd, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
         if (errno == EINTR) continue;
         if (errno != EAGAIN)
             return fail(fmt::format("cannot reach {}: {}; start the stage first", made.name_, std::strerror(errno)));

@@ -4,9 +4,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <linux/magic.h>
-#include <sys/stat.h>
-#include <sys/statfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +12,7 @@
 #include <cstring>
 #include <memory>
 
+#include "image/disk_room.hpp"
 #include "image/nameless_file.hpp"
 #include "steady_clock.hpp"
 
@@ -106,16 +104,6 @@ std::optional<double> read_pieces(int fd, std::byte* piece, const DiskSpeedOptio
 }
 
 }  // namespace
-
-Result<DiskRoom> room_of(const std::string& folder) {
-    struct statfs file_system {};
-    struct stat entry {};
-    if (::statfs(folder.c_str(), &file_system) != 0 || ::stat(folder.c_str(), &entry) != 0)
-        return fail(fmt::format("cannot look at the folder '{}': {}", folder, std::strerror(errno)));
-    if (!S_ISDIR(entry.st_mode)) return fail(fmt::format("'{}' is no folder", folder));
-    return DiskRoom{uint64_t(file_system.f_bavail) * uint64_t(file_system.f_bsize),
-                    file_system.f_type == TMPFS_MAGIC || file_system.f_type == RAMFS_MAGIC, uint64_t(entry.st_dev)};
-}
 
 Result<DiskSpeed> measure_disk(const std::string& folder, const DiskSpeedOptions& options) {
     const auto room = room_of(folder);

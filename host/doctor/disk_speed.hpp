@@ -33,11 +33,4 @@ struct DiskSpeed {
 // Errors: no file can be made or written there, or too little room.
 Result<DiskSpeed> measure_disk(const std::string& folder, const DiskSpeedOptions& options = {});
 
-struct DiskRoom {
-    uint64_t free_bytes = 0;  // to this user
-    bool is_memory = false;   // tmpfs: no disk at all
-    uint64_t device = 0;      // which file system
-};
-Result<DiskRoom> room_of(const std::string& folder);
-
 }  // namespace ols

@@ -7,6 +7,7 @@
 
 #include "doctor/check_up.hpp"
 #include "doctor/disk_speed.hpp"
+#include "image/disk_room.hpp"
 
 namespace ols {
 

@@ -10,26 +10,19 @@ namespace ols {
 
 namespace {
 
-// Cycles of frames that a take has in memory whatever happens: the one that comes, the one that is developed, and one on either
-// side of it for what is filled from neighbours.
-constexpr double cycles_held = 4;
-
-double held_bytes(const StageNeeds& needs) {
-    return cycles_held * needs.cycle_s * needs.raw_bytes_per_s();
-}
-
 Finding check_free(const CheckUp& up) {
     const auto free = up.machine.memory_bytes("MemAvailable");
     if (!free) return skipped(Check::memory_free, "the kernel does not say how much memory is free");
-    const double raw = up.needs.raw_bytes_per_s(), least = held_bytes(up.needs);
+    const double raw = up.needs.raw_bytes_per_s(), least = up.needs.held_bytes();
     const double take = raw * up.needs.take_s;
-    Finding finding{Check::memory_free,
-                    "",
-                    CheckVerdict::ok,
-                    bytes_text(double(*free)) + " free",
-                    fmt::format("{}: {:g} cycles of frames; {} for a take of {:g} s that is held in memory, at {}/s",
-                                bytes_text(least), cycles_held, bytes_text(take), up.needs.take_s, bytes_text(raw)),
-                    {}};
+    Finding finding{
+        Check::memory_free,
+        "",
+        CheckVerdict::ok,
+        bytes_text(double(*free)) + " free",
+        fmt::format("{}: {} frames of each camera; {} for a take of {:g} s that is held in memory, at {}/s",
+                    bytes_text(least), up.needs.frames_held, bytes_text(take), up.needs.take_s, bytes_text(raw)),
+        {}};
     if (double(*free) < least) {
         finding.verdict = CheckVerdict::fail;
         finding.commands = {"ps --sort=-rss -eo rss,pid,comm | head    # who has it: end it, or fit more"};
@@ -50,14 +43,14 @@ uint64_t swap_bytes(const Machine& machine) {
 Finding check_lock(const CheckUp& up) {
     const auto limit = up.machine.limit("Max locked memory");
     if (!limit) return skipped(Check::memory_lock, "the kernel does not say how much memory may be locked");
-    const double needed = held_bytes(up.needs);
-    Finding finding{
-        Check::memory_lock,
-        "",
-        CheckVerdict::ok,
-        limit->soft == Limit::none ? "no limit" : bytes_text(double(limit->soft)) + " at most",
-        fmt::format("{}: {:g} cycles of frames that the kernel must not swap out", bytes_text(needed), cycles_held),
-        {}};
+    const double needed = up.needs.held_bytes();
+    Finding finding{Check::memory_lock,
+                    "",
+                    CheckVerdict::ok,
+                    limit->soft == Limit::none ? "no limit" : bytes_text(double(limit->soft)) + " at most",
+                    fmt::format("{}: {} frames of each camera that the kernel must not swap out", bytes_text(needed),
+                                up.needs.frames_held),
+                    {}};
     if (limit->soft == Limit::none || double(limit->soft) >= needed) return finding;
     if (up.machine.has_capability(14 /* CAP_IPC_LOCK */)) {
         finding.found += ", and CAP_IPC_LOCK, which lifts that";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Frames as image/frame.hpp holds them.
+// From the stage's cameras and the sequence's triggers.
 #include "doctor/needs.hpp"
 
 #include <algorithm>
@@ -9,21 +9,17 @@ namespace ols {
 
 namespace {
 
-constexpr uint64_t sample_bytes = 2;  // PixelFormat::u16
-
 uint64_t triggers_a_cycle(const Sequence& sequence, int line) {
     return uint64_t(
         std::ranges::count_if(sequence.slots, [line](const Slot& slot) { return slot.trigger_mask >> line & 1; }));
 }
 
 CameraNeeds needs_of(const CameraConfig& camera, const Sequence& sequence) {
-    const uint64_t pixels = uint64_t(camera.width) * uint64_t(camera.height);
-    const uint64_t planes = camera.cfa == Cfa::rgb ? 3 : 1;
     const double cycle_s = double(sequence.cycle_ticks()) / double(tick_hz);
     CameraNeeds needs;
     needs.frames_per_s = double(triggers_a_cycle(sequence, camera.trigger)) / cycle_s;
-    needs.frame_bytes = pixels * planes * sample_bytes;
-    needs.link_frame_bytes = pixels * planes * uint64_t((camera.bits + 7) / 8);
+    needs.frame_bytes = camera.frame_bytes();
+    needs.link_frame_bytes = camera.frame_bytes() / sizeof(uint16_t) * size_t((camera.bits + 7) / 8);
     return needs;
 }
 
@@ -40,11 +36,16 @@ double StageNeeds::archive_bytes_per_s() const {
     });
 }
 
+double StageNeeds::held_bytes() const {
+    return std::accumulate(cameras.begin(), cameras.end(), 0.0, [this](double sum, const CameraNeeds& camera) {
+        return sum + double(frames_held) * double(camera.frame_bytes);
+    });
+}
+
 StageNeeds needs_of(const StageConfig& stage, const Sequence& sequence, double take_s, double target_rate_hz,
                     const std::vector<uint64_t>& target_bytes) {
     StageNeeds needs;
-    needs.cycle_s = double(sequence.cycle_ticks()) / double(tick_hz);
-    needs.targets_per_s = target_rate_hz > 0 ? target_rate_hz : 1 / needs.cycle_s;
+    needs.targets_per_s = target_rate_hz > 0 ? target_rate_hz : double(tick_hz) / double(sequence.cycle_ticks());
     needs.take_s = take_s;
     for (size_t camera = 0; camera < stage.cameras.size(); ++camera) {
         needs.cameras.push_back(needs_of(stage.cameras[camera], sequence));

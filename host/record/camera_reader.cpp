@@ -14,7 +14,7 @@ namespace {
 
 // Frames that wait in a camera's own buffers, at most: 1024 of GigE Vision's, 256 of the virtual stage's ring, 32 of V4L2's; and some that
 // were being filled or read, and the one behind the gap.
-constexpr int backlog_max = 1100;
+constexpr int backlog_max = Camera::buffers_max + 76;
 
 // Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
 bool is_whole(const Frame& frame, const CameraConfig& config) {

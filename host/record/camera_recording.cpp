@@ -37,11 +37,11 @@ IdentifyOptions identify_options(const Sequence& sequence, uint64_t camera_ns_at
     return options;
 }
 
-CameraRecording::CameraRecording(const Sequence& sequence, size_t place, const RecordSink& sink,
+CameraRecording::CameraRecording(const Sequence& sequence, const RecordedCamera& recorded, size_t place,
                                  uint64_t camera_ns_at_start, const std::atomic<bool>& stop, RecordMonitor& monitor)
     : sequence_(sequence),
+      recorded_(recorded),
       place_(place),
-      sink_(sink),
       stop_(stop),
       monitor_(monitor),
       identifier_(sequence, identify_options(sequence, camera_ns_at_start)),
@@ -148,7 +148,7 @@ void CameraRecording::hand_on() {
     for (Verdict& verdict : identifier_.take_verdicts()) {
         if (verdict.kind == Verdict::missing) {
             report_.missing.add(verdict.slot.why.cause);
-            sink_.missing(verdict.slot);
+            recorded_.sink.missing(verdict.slot);
             continue;
         }
         const auto found = frames_.find(verdict.arrival);
@@ -161,12 +161,12 @@ void CameraRecording::hand_on() {
             identified(frame, verdict.entry);
         }
     }
-    monitor_.change_camera(place_, [this](CameraProgress& camera) {
+    monitor_.change_camera(recorded_.index, [this](CameraProgress& camera) {
         camera.slots_decided = identifier_.decided();
         camera.missing = report_.missing;
         camera.has_ended = finished_;
     });
-    sink_.progress(identifier_.decided(), slots_total_);
+    recorded_.sink.progress(identifier_.decided(), slots_total_);
 }
 
 void CameraRecording::identified(const std::shared_ptr<Frame>& frame, const ols_trigger_log_entry& entry) {
@@ -181,7 +181,7 @@ void CameraRecording::identified(const std::shared_ptr<Frame>& frame, const ols_
         clock_restarts_ = restarts;
     }
     clock_.add(frame->tick, frame->stamp.timestamp_ns);
-    sink_.frame(frame);
+    recorded_.sink.frame(frame);
 }
 
 }  // namespace ols

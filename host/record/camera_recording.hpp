@@ -20,7 +20,7 @@ IdentifyOptions identify_options(const Sequence& sequence, uint64_t camera_ns_at
 class CameraRecording {
   public:
     // `place`: the camera's among those that are recorded (LogNews::arrivals).
-    CameraRecording(const Sequence& sequence, size_t place, const RecordSink& sink, uint64_t camera_ns_at_start,
+    CameraRecording(const Sequence& sequence, const RecordedCamera& recorded, size_t place, uint64_t camera_ns_at_start,
                     const std::atomic<bool>& stop, RecordMonitor& monitor);
 
     // Takes news, and hands on what they decide to the sink.
@@ -46,8 +46,8 @@ class CameraRecording {
     void identified(const std::shared_ptr<Frame>& frame, const ols_trigger_log_entry& entry);
 
     const Sequence& sequence_;
+    const RecordedCamera& recorded_;
     const size_t place_;
-    const RecordSink& sink_;
     const std::atomic<bool>& stop_;
     RecordMonitor& monitor_;
     Identifier identifier_;

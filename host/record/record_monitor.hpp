@@ -2,6 +2,7 @@
 // Record monitor: the live account of a recording, which its threads fill and any other reads.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -54,9 +55,9 @@ class RecordMonitor {
     }
     void add_camera(uint32_t index, std::shared_ptr<const FrameRoom> room);
     template <typename Change>
-    void change_camera(size_t place, Change&& change) {
+    void change_camera(size_t index, Change&& change) {
         const std::lock_guard lock(mutex_);
-        change(progress_.cameras[place]);
+        change(*std::ranges::find(progress_.cameras, index, &CameraProgress::index));
     }
 
   private:

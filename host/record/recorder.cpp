@@ -49,7 +49,7 @@ class CameraTake {
           sequence_(sequence),
           stop_(stop),
           monitor_(monitor),
-          beat_(monitor.stages().add(fmt::format("camera {} identification", place))),
+          beat_(monitor.stages().add(fmt::format("camera {} identification", recorded.index))),
           room_(std::move(room)),
           counts_before_(recorded.camera.counts()),
           started_(recorded.camera, room_, stop) {
@@ -66,10 +66,10 @@ class CameraTake {
     uint64_t arrivals() const { return reader_->arrivals(); }
 
     void begin(const CameraConfig& config) {
-        recording_.emplace(sequence_, place_, recorded_.sink, *started_.time_ns, stop_, monitor_);
+        recording_.emplace(sequence_, recorded_, place_, *started_.time_ns, stop_, monitor_);
         reader_.emplace(recorded_.camera, config,
                         CameraReaderOptions{recorded_.black_counts, room_, recorded_.sink.waits_for_disk}, queue_,
-                        monitor_, place_);
+                        monitor_, recorded_.index);
         thread_ = std::thread([this] {
             failure_ = guarded("its frames cannot be taken", [this] { return identify(), Status(Done{}); });
             has_failed_ = !failure_.ok();
@@ -122,7 +122,7 @@ Result<std::shared_ptr<FrameRoom>> room_of(const RecordedCamera& recorded, const
     if (recorded.sink.room) return recorded.sink.room;
     FrameRoom::Options options;
     options.frames_max = frames_in_flight(sequence);
-    options.frame_bytes = frame_bytes(stage.cameras[recorded.index]);
+    options.frame_bytes = stage.cameras[recorded.index].frame_bytes();
     return FrameRoom::create(options);
 }
 
@@ -156,10 +156,6 @@ Status start_armed_board(Board& board) {
 Status start_board(Board& board, const Sequence& sequence, const StageConfig& stage) {
     if (const Status armed = arm_board(board, sequence, stage); !armed.ok()) return armed;
     return start_armed_board(board);
-}
-
-size_t frame_bytes(const CameraConfig& camera) {
-    return size_t(camera.width) * size_t(camera.height) * size_t(samples_per_pixel(camera.cfa)) * sizeof(uint16_t);
 }
 
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept) {

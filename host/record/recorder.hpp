@@ -73,9 +73,6 @@ struct RecordReport {
 // `cycles_kept` that developing holds besides, and two reorder windows.
 size_t frames_in_flight(const Sequence& sequence, size_t cycles_kept = 0);
 
-// Of a frame's samples, 16 bits each.
-size_t frame_bytes(const CameraConfig& camera);
-
 // Loads and arms the sequence as its playback says. The error is the board's own, or says what a latched fault was.
 Status arm_board(Board& board, const Sequence& sequence, const StageConfig& stage);
 

@@ -25,6 +25,11 @@ struct CameraSetup {
     ExposureMode exposure_mode = ExposureMode::trigger_width;
     double exposure_us = 100;                     // of ExposureMode::timed
     std::map<std::string, std::string> controls;  // settings of the device's own, by its names for them: "Gain" is "12"
+
+    // Of a frame in memory: a 16-bit word a sample.
+    size_t frame_bytes() const {
+        return size_t(width) * size_t(height) * size_t(samples_per_pixel(cfa)) * sizeof(uint16_t);
+    }
 };
 
 }  // namespace ols

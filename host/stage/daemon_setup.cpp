@@ -35,7 +35,7 @@ DaemonSetup read_daemon(TomlSection daemon) {
     daemon.read("nominal", setup.nominal);
     daemon.read("float", setup.single_float);
     for (const char* key : {"sequence", "slate", "quality", "fill", "estimate", "fps", "socket", "socket_group",
-                            "http_port", "token_file", "takes"})
+                            "http_port", "token_file", "takes", "spill"})
         setup.places[key] = daemon.place(key);
     return setup;
 }

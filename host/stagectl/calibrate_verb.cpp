@@ -54,23 +54,10 @@ Result<int> run(const Options& options) {
     if (!card.ok()) return because_of(stop, card.error());
     if (Status s = write_calibration(options.output, options.card.camera, card->calibration, card->record); !s.ok())
         return s.error();
-    if (options.json) {
-        const nlohmann::json json = {{"calibration", options.output},
-                                     {"frames", card->record.frames},
-                                     {"camera", options.card.camera},
-                                     {"slots_missing", card->report.missing().total()},
-                                     {"exposure_us", card->record.card_exposure_us},
-                                     {"black_counts", card->black_mean},
-                                     {"flat_counts_per_us", card->flat_mean},
-                                     {"brightest_share", card->brightest}};
-        print_json(json);
-    } else {
-        fmt::print(
-            "{}: {} frames of card and of dark at {:.2f} us; black {:.2f} counts, flat {:.4f} counts a "
-            "microsecond, card at {:.0f} % of the range at most\n",
-            options.output, card->record.frames, card->record.card_exposure_us, card->black_mean, card->flat_mean,
-            card->brightest * 100);
-    }
+    if (options.json)
+        print_json(card->to_json(options.output));
+    else
+        fmt::print("{}: {}\n", options.output, card->to_text());
     return 0;
 }
 

@@ -69,4 +69,15 @@ std::string event_line(const nlohmann::json& event) {
                        event.value("code", 0), event.value("event", ""), event.value("text", ""));
 }
 
+std::string take_line(const nlohmann::json& progress) {
+    uint64_t frames = 0, missing = 0;
+    for (const auto& camera : progress["cameras"]) {
+        frames += camera["frames_received"].get<uint64_t>();
+        for (const auto& [cause, count] : camera["slots_missing"].items()) missing += count.get<uint64_t>();
+    }
+    return fmt::format("{}: {} of {} triggers, {} frames, {} slots missing{}", progress["take"].get<std::string>(),
+                       progress["triggers_fired"].get<uint64_t>(), progress["triggers_planned"].get<uint64_t>(), frames,
+                       missing, progress["dark"].get<bool>() ? ", dark" : "");
+}
+
 }  // namespace ols

@@ -52,4 +52,7 @@ void add_call_verb(CLI::App& app, int& exit_code, const CallVerb& verb);
 // "12:00:01 warning 306 slots_missing: ..." of an event.
 std::string event_line(const nlohmann::json& event);
 
+// "12A_001: 700 of 1440 triggers, 698 frames, 2 slots missing, dark" of a take's progress, all cameras together.
+std::string take_line(const nlohmann::json& progress);
+
 }  // namespace ols

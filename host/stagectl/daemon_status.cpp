@@ -12,14 +12,7 @@ namespace ols {
 namespace {
 
 void print_take(const nlohmann::json& take) {
-    uint64_t frames = 0, missing = 0;
-    for (const auto& camera : take["cameras"]) {
-        frames += camera["frames_received"].get<uint64_t>();
-        for (const auto& [cause, count] : camera["slots_missing"].items()) missing += count.get<uint64_t>();
-    }
-    fmt::print("{}: {} of {} triggers, {} frames, {} slots missing{}\n", take["take"].get<std::string>(),
-               take["triggers_fired"].get<uint64_t>(), take["triggers_planned"].get<uint64_t>(), frames, missing,
-               take["dark"].get<bool>() ? ", dark" : "");
+    fmt::print("{}\n", take_line(take));
     for (const auto& output : take["outputs"])
         fmt::print("  {} of {} targets written, {} missing; {:.1f} s behind\n",
                    output["targets_written"].get<uint64_t>(), output["targets_planned"].get<uint64_t>(),

@@ -14,6 +14,7 @@
 #include "stagectl/sequence_options.hpp"
 #include "stagectl/session.hpp"
 #include "stagectl/verbs.hpp"
+#include "take/frame_rooms.hpp"
 
 namespace ols {
 
@@ -83,7 +84,13 @@ Result<StageNeeds> needs_of(const Options& options, const StageConfig& stage) {
     if (sequence->is_capture())
         for (size_t camera = 0; camera < stage.cameras.size(); ++camera)
             target_bytes.push_back(target_bytes_max(*sequence, stage, camera, targets, false));
-    return needs_of(stage, *sequence, options.take_s.value_or(10), target_rate_hz, target_bytes);
+    StageNeeds needs = needs_of(stage, *sequence, options.take_s.value_or(10), target_rate_hz, target_bytes);
+    TakeDescription take{*sequence, stage, {}, {}};
+    take.sequence.config.cycles = 4;  // none of its targets needs frames of more
+    take.masks.fill_from_neighbours = stage.daemon.fill == "neighbours";
+    take.memory.spill_folder = options.spill;
+    needs.frames_held = frames_held(take, {{std::shared_ptr<TargetSink>(), targets}});
+    return needs;
 }
 
 bool is_coloured() {

@@ -39,7 +39,9 @@ void add_serve_verb(CLI::App& app, int& exit_code) {
         "Flashing light can trigger seizures: see `stagectl sequence`.");
     verb->add_option("--config", options->daemon.config_path, "the stage, with a table [daemon]")
         ->capture_default_str();
-    verb->add_flag("--check", options->check, "check the configuration, and end");
+    verb->add_flag(
+        "--check", options->check,
+        "check the configuration, and end; as root or as the daemon's user, for it looks at its folders, too");
     verb->add_flag("--json", options->json, "print what --check found as JSON");
     verb->callback([options, &exit_code] {
         options->daemon.program_version = program_version("stagectl");

@@ -25,21 +25,13 @@ int exit_code_of(const nlohmann::json& take) {
 
 void TakeFollower::show(const nlohmann::json& progress) {
     if (!isatty(STDERR_FILENO)) return;
-    uint64_t received = 0, missing = 0;
-    double behind_s = 0;
-    for (const auto& camera : progress["cameras"]) {
-        received += camera["frames_received"].get<uint64_t>();
-        for (const auto& [cause, count] : camera["slots_missing"].items()) missing += count.get<uint64_t>();
-    }
     uint64_t written = 0;
+    double behind_s = 0;
     for (const auto& output : progress["outputs"]) {
         written += output["targets_written"].get<uint64_t>();
         behind_s = std::max(behind_s, output["seconds_behind"].get<double>());
     }
-    fmt::print(stderr, "\r{}: {} of {} triggers, {} frames, {} slots missing, {} targets, {:.1f} s behind{}  ",
-               progress["take"].get<std::string>(), progress["triggers_fired"].get<uint64_t>(),
-               progress["triggers_planned"].get<uint64_t>(), received, missing, written, behind_s,
-               progress["dark"].get<bool>() ? ", dark" : "");
+    fmt::print(stderr, "\r{}, {} targets, {:.1f} s behind  ", take_line(progress), written, behind_s);
 }
 
 std::optional<Result<int>> TakeFollower::take(const nlohmann::json& event) {

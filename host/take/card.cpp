@@ -125,6 +125,24 @@ Status check_card(const Average& card, const Image& above_black, double range, d
 
 }  // namespace
 
+nlohmann::json CardCalibration::to_json(const std::string& folder) const {
+    return {{"calibration", folder},
+            {"camera", report.cameras[0].index},
+            {"frames", record.frames},
+            {"slots_missing", report.missing().total()},
+            {"exposure_us", record.card_exposure_us},
+            {"black_counts", black_mean},
+            {"flat_counts_per_us", flat_mean},
+            {"brightest_share", brightest}};
+}
+
+std::string CardCalibration::to_text() const {
+    return fmt::format(
+        "camera {}: {} frames of card and of dark at {:.2f} us; black {:.2f} counts, flat {:.4f} counts a microsecond, "
+        "card at {:.0f} % of the range at most",
+        report.cameras[0].index, record.frames, record.card_exposure_us, black_mean, flat_mean, brightest * 100);
+}
+
 Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const StageConfig& stage,
                                             const CardOptions& options, const StopRequest& stop,
                                             const std::function<void(uint64_t, uint64_t)>& progress,

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <atomic>
+#include <nlohmann/json.hpp>
+#include <string>
 
 #include "record/recorder.hpp"
 #include "stage/calibration.hpp"
@@ -22,6 +24,10 @@ struct CardCalibration {
     RecordReport report;
     double black_mean = 0, flat_mean = 0;
     double brightest = 0;  // of the averaged card, share of the range above black
+
+    // What was measured, and the folder that it was written to.
+    nlohmann::json to_json(const std::string& folder) const;
+    std::string to_text() const;
 };
 
 // Plays dark slots and slots with all sphere lamps in turn, averages each kind over all frames (a plain mean: noise falls

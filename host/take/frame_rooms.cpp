@@ -23,6 +23,7 @@ size_t cycles_kept(const TakeMasks& masks, const std::vector<TakeOutput>& output
 
 // Frames that developers bring back from the disk at once: each those of one target.
 size_t frames_brought_back(const TakeDescription& take, const std::vector<TakeOutput>& outputs) {
+    if (take.memory.spill_folder.empty()) return 0;
     uint64_t sum = 0;
     for (const TakeOutput& output : outputs) {
         uint64_t most = 0;
@@ -42,6 +43,10 @@ MemoryReport FrameRooms::report() const {
     return report;
 }
 
+size_t frames_held(const TakeDescription& take, const std::vector<TakeOutput>& outputs) {
+    return frames_in_flight(take.sequence, cycles_kept(take.masks, outputs)) + frames_brought_back(take, outputs);
+}
+
 Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vector<TakeOutput>& outputs) {
     const TakeMemory& memory = take.memory;
     FrameRooms rooms;
@@ -52,13 +57,13 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
     }
     FrameRoom::Options options;
     options.spill = rooms.spill;
-    options.reserve = rooms.spill ? frames_brought_back(take, outputs) : 0;
+    options.reserve = frames_brought_back(take, outputs);
     options.period = std::chrono::nanoseconds(take.sequence.slots.front().period_ticks * 1'000'000'000ull / tick_hz);
-    const size_t least = frames_in_flight(take.sequence, cycles_kept(take.masks, outputs)) + options.reserve;
+    const size_t least = frames_held(take, outputs);
     options.frames_max = least;
     if (memory.ram_bytes > 0) {
         uint64_t bytes = 0;  // of a frame of each camera
-        for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(frame_bytes(camera));
+        for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(camera.frame_bytes());
         const uint64_t frames = memory.ram_bytes / bytes;
         if (frames < least)
             return fail(
@@ -70,7 +75,7 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
         options.is_touched = true;
     }
     for (const CameraConfig& camera : take.stage.cameras) {
-        options.frame_bytes = frame_bytes(camera);
+        options.frame_bytes = camera.frame_bytes();
         auto room = FrameRoom::create(options);
         if (!room.ok()) return room.error();
         rooms.of_camera.push_back(std::move(*room));

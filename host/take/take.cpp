@@ -29,8 +29,7 @@ class Output {
           monitor_(monitor.add_output(take.stage.cameras.size(), take.sequence.slots.front().period_ticks)),
           writer_(*sink_, monitor_) {
         for (uint32_t camera = 0; camera < take.stage.cameras.size(); ++camera) {
-            developers_.emplace_back(take, targets_, camera, writer_, monitor_,
-                                     rooms.of_camera.empty() ? nullptr : rooms.of_camera[camera]);
+            developers_.emplace_back(take, targets_, camera, writer_, monitor_, rooms.room_of(camera));
             monitor_.plan(developers_.back().target_count());
         }
     }
@@ -106,7 +105,7 @@ RecordSink sink_of(size_t camera, const std::vector<std::unique_ptr<Output>>& ou
                 for (const auto& output : outputs) output->developer(camera).hand_on(decided);
                 progress(decided, total);
             },
-            rooms.of_camera.empty() ? nullptr : rooms.of_camera[camera],
+            rooms.room_of(camera),
             [&outputs] {
                 return std::ranges::any_of(outputs, [](const auto& output) { return output->waits_for_disk(); });
             }};

@@ -116,8 +116,8 @@ def test_the_page_of_operating_has_the_tables_of_the_program(daemon):
         row[0]: (row[1], [state for state, cell in zip(STATES, row[2:]) if cell == "x"]) for row in rows if len(row) == 7
     }
     assert table == {one["name"]: (one["command"], one["allowed"]) for one in version["methods"]}
-    events = {int(code): (name, level) for code, name, level in re.findall(r"^\| (\d{3}) \| `(\w+)` \| (\w+) \|", page, re.M)}
-    assert events == {one["code"]: (one["event"], one["level"]) for one in version["events"]}
+    events = re.findall(r"^\| (\d{3}) \| `(\w+)` \| (\w+) \| (.+) \|$", page, re.M)
+    assert events == [(str(one["code"]), one["event"], one["level"], one["meaning"]) for one in version["events"]]
 
 
 @pytest.mark.parametrize("state", ["idle", "armed"])

@@ -123,6 +123,33 @@ def test_a_configuration_that_is_wrong_is_said_with_file_and_line_and_the_old_on
     assert "for the states idle or fault" in daemon.run("reload", code=1)
 
 
+def test_a_folder_that_cannot_be_written_to_is_said_with_file_and_line(alone):
+    daemon = alone()
+
+    def serve(*options):
+        command = [str(BIN / "stagectl"), "serve", "--config", str(daemon.config), *options]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+    takes = f'takes = "{daemon.takes}"\n'
+    at = daemon.text[: daemon.text.index(takes)].count("\n") + 1
+    # Below a file there is none, not for root either.
+    for key, line in {"takes": at, "spill": at + 1}.items():
+        others = takes if key == "spill" else ""
+        daemon.config.write_text(daemon.text.replace(takes, f'{others}{key} = "{daemon.config}/{key}"\n'))
+        said = f"{daemon.config}:{line}: daemon.{key} is '{daemon.config}/{key}', which is no folder"
+        assert said in daemon.run("reload", code=1)
+        for options in ((), ("--check",)):
+            refused = serve(*options)
+            assert refused.returncode == 1 and said in refused.stderr, refused
+    # One that is not there yet is made where the daemon itself reads of it.
+    new = daemon.folder / "new/takes"
+    daemon.config.write_text(daemon.text.replace(str(daemon.takes), str(new)))
+    assert serve("--check").returncode == 0 and not new.parent.exists()
+    daemon.run("reload")
+    daemon.until_state("idle")
+    assert new.is_dir() and daemon.run("record", "--json")["targets_missing"] == 0
+
+
 def test_a_daemon_without_its_devices_waits_for_them(tmp_path):
     with Daemon(tmp_path) as daemon:
         daemon.until_state("fault")

@@ -72,7 +72,7 @@ class DoctorTest : public ScratchFolder {
                                     .frame_bytes = 2'000'000,
                                     .link_frame_bytes = 1'000'000,
                                     .target_bytes = 10'000'000});
-        up.needs.cycle_s = 0.1;
+        up.needs.frames_held = 4;
         up.needs.targets_per_s = 10;
         up.needs.take_s = 10;
         up.cameras = place_cameras(sources_, listing);

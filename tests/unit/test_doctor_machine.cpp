@@ -62,7 +62,7 @@ TEST_F(MachineOfAShoot, may_have_enough_files_open) {
     expect(check_processor(up), Check::open_files, CheckVerdict::ok, "no limit");
 }
 
-// 2 MB a frame, 10 frames/s: 8 MB in four cycles of 0.1 s, 200 MB in 10 s.
+// 2 MB a frame, 10 frames/s: 8 MB of the four that are held, 200 MB in 10 s.
 TEST_F(MachineOfAShoot, has_memory_for_the_frames_that_wait) {
     give_camera("fake:10", 10);
     put_memory(7'812, 0, 0);

@@ -177,10 +177,14 @@ TEST_F(MeshBinaries, gltf_data_are_in_the_file_in_its_text_or_beside_it) {
     write("the data.bin", square.data());
     square.buffer = R"(,"uri":"the%20data.bin")";
     check("m.gltf", square.json());
-    // By `base64 -w0` of coreutils.
-    square.buffer =
-        R"(,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAAAAABAAIAAAACAAMA")";
-    check("m.gltf", square.json());
+    // By `base64 -w0` of coreutils; a byte more, without the padding; and what is none.
+    const std::string text = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAAAAABAAIAAAACAAM";
+    for (const char* end : {"A", "AAA"}) {
+        square.buffer = R"(,"uri":"data:application/octet-stream;base64,)" + text + end + "\"";
+        check("m.gltf", square.json());
+    }
+    square.buffer = R"(,"uri":"data:application/octet-stream;base64,)" + text + "*\"";
+    EXPECT_PRED2(contains, refusal("m.gltf", square.json()), "something else than base64");
     for (const std::string uri : {"../m.bin", "/etc/passwd", "file:///etc/passwd", "http://a/b", "a/%2e%2e/%2e%2e/b"}) {
         square.buffer = R"(,"uri":")" + uri + "\"";
         EXPECT_PRED2(contains, refusal("m.gltf", square.json()), "lies outside of its folder");

@@ -86,7 +86,7 @@ class TakeMemories : public TakeDirectory {
     }
     TakeMemory enough() const {
         const TakeDescription take = PlayedTake::describe("single", cycles);
-        return {take.sequence.trigger_count() * 2 * FrameRoom::bytes_a_frame(frame_bytes(take.stage.cameras[0])), "",
+        return {take.sequence.trigger_count() * 2 * FrameRoom::bytes_a_frame(take.stage.cameras[0].frame_bytes()), "",
                 0};
     }
     void run_quick(const std::string& to) {

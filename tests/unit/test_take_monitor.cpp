@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "played_take.hpp"
 #include "steady_clock.hpp"
 #include "take_fixture.hpp"
@@ -85,6 +87,28 @@ TEST_F(MonitoredTake, a_take_that_is_over_is_told_to_the_last_slot_and_target) {
         EXPECT_GT(stage.beats, 0u) << stage.name;
         EXPECT_EQ(stage.activity, StageActivity::ended) << stage.name;
     }
+}
+
+// A calibration records one camera of the stage's.
+TEST(RecordMonitor, the_threads_of_a_camera_are_named_by_its_index_in_the_stage) {
+    PlayedTake take("single", 2);
+    StageConfig& stage = take.description.stage;
+    stage.cameras.push_back(stage.cameras[0]);
+    const RecordSink sink{[](const auto&) {}, [](const MissingSlot&) {}, [](uint64_t, uint64_t) {}};
+    RecordMonitor monitor;
+    take.camera.play(take.model);
+    const auto report = record_take(take.board, {{take.camera, 1, std::nullopt, sink}}, take.description.sequence,
+                                    stage, take.stop, &monitor);
+    take.camera.end();
+    ASSERT_TRUE(report.ok()) << report.error().message;
+    const RecordProgress end = monitor.progress();
+    EXPECT_EQ(end.cameras[0].index, 1u);
+    EXPECT_EQ(end.cameras[0].frames_received, take.description.sequence.trigger_count());
+    EXPECT_EQ(end.cameras[0].slots_decided, take.description.sequence.trigger_count());
+    std::set<std::string> names;
+    for (const StageProgress& thread : end.stages) names.insert(thread.name);
+    EXPECT_TRUE(names.contains("camera 1 reader"));
+    EXPECT_TRUE(names.contains("camera 1 identification"));
 }
 
 TEST_F(MonitoredTake, a_stop_is_told_and_the_dark_confirmed_while_what_was_fired_is_still_identified) {

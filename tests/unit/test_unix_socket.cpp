@@ -14,6 +14,8 @@
 
 #include "device/can_bus.hpp"
 #include "device/transfer.hpp"
+#include "device/unix_address.hpp"
+#include "device/unix_listener.hpp"
 
 using namespace ols;
 
@@ -88,6 +90,16 @@ TEST_F(OtherEnd, connecting_to_one_that_lets_nobody_in_ends) {
         queue.push_back(std::move(*socket));
     }
     FAIL() << "a hundred clients were let in";
+}
+
+TEST(UnixAddresses, that_the_system_has_no_room_for_are_refused) {
+    EXPECT_TRUE(unix_address(std::string(107, 'a')).ok());
+    for (const std::string& path : {std::string(), std::string(108, 'a')})
+        for (const Error& error :
+             {UnixSocket::connect(path, "the board", within(short_ms)).error(), listen_at(path).error()})
+            EXPECT_NE(error.message.find("'" + path + "' is no path of a socket, which has 1 to 107 bytes"),
+                      std::string::npos)
+                << error.message;
 }
 
 TEST_F(OtherEnd, a_bus_that_does_not_tell_the_time_is_given_up) {

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "image/base64.hpp"
 #include "image/input_file.hpp"
 #include "scene/polygon_mesh.hpp"
 
@@ -68,24 +69,6 @@ Parts split(std::string_view bytes) {
     return parts;
 }
 
-std::string from_base64(std::string_view text) {
-    std::string bytes;
-    uint32_t bits = 0;
-    int count = 0;
-    while (text.ends_with('=')) text.remove_suffix(1);
-    for (const char c : text) {
-        static constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        const size_t digit = digits.find(c);
-        if (digit == digits.npos) wrong("a data: URI holds something else than base64");
-        bits = bits << 6 | uint32_t(digit);
-        count += 6;
-        if (count < 8) continue;
-        count -= 8;
-        bytes.push_back(char(bits >> count & 0xff));
-    }
-    return bytes;
-}
-
 std::string without_escapes(std::string_view uri) {
     std::string name;
     for (size_t i = 0; i < uri.size(); ++i) {
@@ -111,7 +94,11 @@ std::string fetch(const std::string& mesh_path, const std::string& uri) {
         const size_t comma = uri.find(',');
         if (comma == uri.npos || !std::string_view(uri).substr(0, comma).ends_with(";base64"))
             wrong("a data: URI is not base64");
-        return from_base64(std::string_view(uri).substr(comma + 1));
+        std::string text = uri.substr(comma + 1);
+        text.append((4 - text.size() % 4) % 4, '=');  // which some programs leave out
+        auto bytes = bytes_of_base64(text);
+        if (!bytes) wrong("a data: URI holds something else than base64");
+        return std::move(*bytes);
     }
     const std::filesystem::path name(without_escapes(uri));
     const bool climbs = std::any_of(name.begin(), name.end(), [](const auto& part) { return part == ".."; });
