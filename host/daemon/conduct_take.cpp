@@ -96,6 +96,7 @@ Status Conductor::wait_for_button(StageWatch& watch) {
 }
 
 void Conductor::begin_take(std::shared_ptr<RunningTake> take) {
+    light_played_ = true;
     {
         const std::lock_guard lock(mutex_);
         take->began = Clock::now();
