@@ -20,6 +20,8 @@ namespace ols {
 Error disk_error(const std::string& action, const std::string& path, int error_number) {
     std::string remedy;
     if (error_number == ENOSPC || error_number == EDQUOT) remedy = ": free space there or choose another disk";
+    if (error_number == EIO || error_number == EROFS)
+        remedy = ": the disk fails: check it and its cable, or choose another disk";
     if (error_number == EFBIG) remedy = ": the file system or a limit (ulimit -f) allows no larger file";
     return fail("cannot " + action + " '" + path + "': " + std::strerror(error_number) + remedy);
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // ArchiveWriter: every step leaves an archive that reads, whatever happens next.
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <deque>
 #include <filesystem>
 #include <set>
@@ -217,9 +219,12 @@ Status ArchiveWriter::write_target(const Target& head, const PlaneSource& source
 
     const fs::path final_name = state.place.folder() / relative, temporary = final_name.string() + unfinished_suffix;
     std::error_code error;
-    if (fs::create_directory(final_name.parent_path(), error))
+    const std::string folder = final_name.parent_path().string();
+    if (mkdir(folder.c_str(), 0777) == 0) {
         if (auto s = sync_directory(state.place.folder().string()); !s) return s;
-    if (error) return fail("cannot make '" + final_name.parent_path().string() + "': " + error.message());
+    } else if (errno != EEXIST) {
+        return disk_error("make", folder, errno);
+    }
 
     if (auto s = write_target_file(temporary.string(), state.info, head, source); !s) return s;
     const auto sum = checksum_file(temporary.string());

@@ -20,15 +20,20 @@ void reply_once(const Reply& reply, Value&& value) {
     }
 }
 
-// Why devices can be no longer trusted after a recording; empty when they can.
-std::string device_trouble(const RecordReport& record, const StopRequest& stop) {
+// Why disks and devices can be no longer trusted after a take; empty when they can.
+std::string trouble_of(const TakeReport& report, const StopRequest& stop) {
     std::string trouble;
     const auto add = [&](const std::string& text) { trouble += (trouble.empty() ? "" : "; ") + text; };
+    for (const OutputReport& output : report.outputs)
+        if (!output.write_error.empty()) add("the archive could not be written whole: " + output.write_error);
+    if (!report.memory.problem.empty()) add(report.memory.problem);
+    const size_t of_disks = trouble.size();
+    const RecordReport& record = report.record;
     const Cause end = record.board_end.cause;
     if (end == Cause::board_gone || end == Cause::board_did_not_fire) add(record.board_end.text);
     for (const CameraReport& camera : record.cameras)
         if (!camera.end.empty()) add(fmt::format("camera {}: {}", camera.index, camera.end.text));
-    if (trouble.empty() && end == Cause::stopped && !stop.wanted) add(record.board_end.text);
+    if (trouble.size() == of_disks && end == Cause::stopped && !stop.wanted) add(record.board_end.text);
     return trouble;
 }
 
@@ -96,6 +101,7 @@ Status Conductor::wait_for_button(StageWatch& watch) {
 }
 
 void Conductor::begin_take(std::shared_ptr<RunningTake> take) {
+    light_played_ = true;
     {
         const std::lock_guard lock(mutex_);
         take->began = Clock::now();
@@ -186,7 +192,9 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
         std::string why = report.error().message;
         if (stop_.wanted && why.find(stop_.why()) == std::string::npos) why += ": " + stop_.why();
         events_.add(EventKind::take_failed, why, {{"take", take->name}});
-        devices_.reset();  // as they are is not known: they are opened anew, and looked at
+        // As they are is not known: they are opened anew, and looked at. A board that were still armed would take that for a lost host.
+        if (devices_) (void)devices_->make_dark();
+        devices_.reset();
         next_look_ = {};
         return change_state(DaemonState::idle, why);
     }
@@ -206,9 +214,7 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
     if (missing > 0) text += " (" + report->record.missing().to_words() + ")";
     if (stop_.wanted) text += "; " + stop_.why();
     events_.add(EventKind::take_finished, text, account);
-    if (!output.write_error.empty())
-        return enter_fault("the archive could not be written whole: " + output.write_error, true);
-    const std::string trouble = device_trouble(report->record, stop_);
+    const std::string trouble = trouble_of(*report, stop_);
     if (!trouble.empty()) return enter_fault(trouble, true);
     change_state(DaemonState::idle);
 }

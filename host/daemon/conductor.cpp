@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "exceptions.hpp"
 
 namespace ols {
@@ -170,10 +172,11 @@ Status Conductor::hold_devices() {
     return Done{};
 }
 
-// While nothing runs: a device that has gone is a fault, which ends by itself when all are back, unless light was to come.
+// While nothing runs: a device that has gone is a fault, which ends by itself when all are back, unless there was light, or was to come.
 void Conductor::look_at_devices() {
     const Snapshot before = snapshot();
     const bool is_armed = before.state == DaemonState::armed;
+    const bool was_in_light = std::exchange(light_played_, false) || is_armed;
     Status there = hold_devices();
     if (there) there = devices_->look(is_armed);
     if (!there) {
@@ -182,7 +185,7 @@ void Conductor::look_at_devices() {
             const std::lock_guard lock(mutex_);
             now_.devices.clear();
         }
-        return enter_fault(there.error().message, is_armed);
+        return enter_fault(there.error().message, was_in_light);
     }
     if (before.state != DaemonState::fault || before.fault_is_latched) return;
     events_.add(EventKind::fault_over, "board and cameras answer again");
@@ -296,8 +299,12 @@ Conductor::Outcome Conductor::stop(const std::string& by) {
 }
 
 Conductor::Outcome Conductor::darken(const std::string& by, Clock::time_point asked) {
-    Status dark = hold_devices();
-    if (dark) dark = devices_->make_dark();
+    // The board without the cameras, where these are not held: one that has gone keeps nobody from putting the light out.
+    const Status dark = [&]() -> Status {
+        if (devices_) return devices_->make_dark();
+        auto board = StageDevices::open_board(stage_, stop_);
+        return board ? StageDevices::make_dark(*board) : Status(board.error());
+    }();
     if (!dark) {
         const std::string why =
             "the board did not confirm that it is dark: use the emergency stop if there is light; " +

@@ -152,6 +152,7 @@ class Conductor {
     std::optional<StageDevices> devices_;
     std::optional<TakePlan> plan_;  // of what is armed
     Clock::time_point next_look_;
+    bool light_played_ = false;  // since the last look at the devices
     std::thread thread_;
 
     Followed followed_;  // the main thread's own

@@ -42,6 +42,8 @@ const std::vector<EventKindFacts> table = {
     {note, "note", warning, "what a person should know of a take, in words"},
     {disk_short, "disk_short", error, "the disk has no room for the take that was asked for; how much would fit"},
     {disk_full, "disk_full", error, "the disk came to its reserve: the take was ended, and finishes what it has"},
+    {disk_failed, "disk_failed", error,
+     "the takes' disk takes no more: the take was ended, and what is on the disk stays"},
     {client_refused, "client_refused", warning, "a token or a request that was not right; a few a minute are told"},
     {client_dropped, "client_dropped", warning, "a subscriber that did not read was let go of"},
 };

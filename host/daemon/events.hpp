@@ -41,6 +41,7 @@ enum class EventKind {
     note = 311,
     disk_short = 401,
     disk_full = 402,
+    disk_failed = 403,
     client_refused = 501,
     client_dropped = 502,
 };

@@ -55,15 +55,21 @@ void Conductor::tell_progress(const TakeProgress& progress, Clock::time_point no
                 {{"missing", missing.to_json()}});
 }
 
-// What is recorded and not written yet needs its room, too.
+// What is recorded and not written yet needs its room, too. There is no light for targets that cannot be written.
 void Conductor::watch_disk(const TakeProgress& progress) {
     if (followed_.take->dark_is_told || followed_.take->target_bytes == 0) return;
+    const auto end_by_failure = [this](const std::string& why) {
+        end_take(EventKind::disk_failed, "the take ends here, as its disk fails: " + why);
+    };
+    uint64_t waiting = 0;
+    for (const OutputProgress& output : progress.outputs) {
+        if (!output.write_error.empty()) return end_by_failure(output.write_error);
+        waiting += output.targets_waiting + 2;
+    }
     const StageConfig stage = this->stage();
     const auto disk = room_of(stage.daemon.takes);
-    uint64_t waiting = 0;
-    for (const OutputProgress& output : progress.outputs) waiting += output.targets_waiting + 2;
+    if (!disk) return end_by_failure(disk.error().message);
     const uint64_t reserve = uint64_t(stage.daemon.reserve_mb) * 1'000'000;
-    if (!disk) return end_take(EventKind::disk_full, disk.error().message);
     if (disk->free_bytes > reserve + waiting * followed_.take->target_bytes) return;
     end_take(
         EventKind::disk_full,

@@ -8,7 +8,6 @@ namespace ols {
 
 Result<StageDevices> StageDevices::open(const StageConfig& stage, const StopRequest& stop) {
     StageDevices devices;
-    if (stage.board.empty()) return fail("the stage names no board: add [board] link to it, as \"usb:\"");
     for (uint32_t index = 0; index < stage.cameras.size(); ++index) {
         const std::string& source = stage.cameras[index].source;
         if (source.empty())
@@ -18,13 +17,18 @@ Result<StageDevices> StageDevices::open(const StageConfig& stage, const StopRequ
         if (!camera.ok()) return camera.error();
         devices.cameras_.push_back(std::move(*camera));
     }
-    Patience patience(Patience::exchange_ms, &stop.wanted);
-    auto transfer = open_transfer(stage.board, patience.begin_exchange());
-    if (!transfer.ok()) return transfer.error();
-    auto board = Board::connect(std::move(*transfer), patience);
+    auto board = open_board(stage, stop);
     if (!board.ok()) return board.error();
     devices.board_ = std::make_unique<Board>(std::move(*board));
     return devices;
+}
+
+Result<Board> StageDevices::open_board(const StageConfig& stage, const StopRequest& stop) {
+    if (stage.board.empty()) return fail("the stage names no board: add [board] link to it, as \"usb:\"");
+    Patience patience(Patience::exchange_ms, &stop.wanted);
+    auto transfer = open_transfer(stage.board, patience.begin_exchange());
+    if (!transfer.ok()) return transfer.error();
+    return Board::connect(std::move(*transfer), patience);
 }
 
 Status StageDevices::look(bool armed) {
@@ -43,13 +47,13 @@ Status StageDevices::look(bool armed) {
     return Done{};
 }
 
-Status StageDevices::make_dark() {
+Status StageDevices::make_dark(Board& board) {
     // A board that has nothing to stop refuses; what it does then tell is what counts.
-    (void)board_->stop();
-    const auto status = board_->status();
+    (void)board.stop();
+    const auto status = board.status();
     if (!status.ok()) return status.error();
     if (status->state == OLS_STATE_PLAYING || status->state == OLS_STATE_WAITING)
-        return fail(fmt::format("{} was told to stop and is still {}", board_->name(), ols::state_name(status->state)));
+        return fail(fmt::format("{} was told to stop and is still {}", board.name(), ols::state_name(status->state)));
     return Done{};
 }
 

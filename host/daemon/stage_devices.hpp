@@ -20,11 +20,15 @@ class StageDevices {
     // which device is not there and what to do.
     static Result<StageDevices> open(const StageConfig& stage, const StopRequest& stop);
 
+    // The board alone.
+    static Result<Board> open_board(const StageConfig& stage, const StopRequest& stop);
+
     // Whether all are still there and the board is as it was left: `armed` or not, without a fault. The error says what is not.
     Status look(bool armed);
 
     // Dark, by the board's own word: its state after a stop is one in which nothing may be lit. The error says what it answered.
-    Status make_dark();
+    static Status make_dark(Board& board);
+    Status make_dark() { return make_dark(*board_); }
 
     Board& board() { return *board_; }
     std::vector<Camera*> cameras() const;

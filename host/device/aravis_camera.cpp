@@ -63,6 +63,7 @@ class AravisCamera : public Camera {
     ~AravisCamera() override {
         halt();
         library_->set_tick(nullptr, tick_ms);
+        if (link_->is_lost()) library_->leave_behind();  // it would be told for seconds that it is let go of
         library_->post([link = std::move(link_)]() mutable { link = nullptr; });
     }
 

@@ -166,9 +166,11 @@ Result<std::shared_ptr<AravisLink>> AravisLink::open(const std::string& name) {
                     "that crashed");
     if (!device) {
         const auto problem = forbidden_usb_camera();
-        return fail(fmt::format("the camera aravis:{} cannot be opened: {}; `arv-tool-0.8` lists those there are{}",
-                                name, error ? error.message() : "there is none of that serial number, id or address",
-                                problem ? "; " + *problem : ""));
+        return fail(
+            fmt::format("the camera aravis:{} cannot be opened: {}; check its power and cable; `arv-tool-0.8` lists "
+                        "those there are{}",
+                        name, error ? error.message() : "there is none of that serial number, id or address",
+                        problem ? "; " + *problem : ""));
     }
     return std::shared_ptr<AravisLink>(new AravisLink(std::move(device)));
 }

@@ -20,7 +20,7 @@ struct LibraryThread::Shared {
 };
 
 LibraryThread::LibraryThread(int end_patience_ms)
-    : shared_(std::make_shared<Shared>()), end_patience_(end_patience_ms) {
+    : shared_(std::make_shared<Shared>()), end_patience_ms_(end_patience_ms) {
     std::thread([shared = shared_] { work(*shared); }).detach();
 }
 
@@ -29,7 +29,7 @@ LibraryThread::~LibraryThread() {
     shared_->ending = true;
     shared_->tick = nullptr;
     shared_->changed.notify_all();
-    shared_->changed.wait_for(lock, end_patience_, [this] { return shared_->ended; });
+    shared_->changed.wait_for(lock, std::chrono::milliseconds(end_patience_ms_), [this] { return shared_->ended; });
 }
 
 void LibraryThread::post(std::function<void()> call) {

@@ -3,6 +3,7 @@
 // for a bounded time; a call that hangs is left behind with all that it holds, and what is asked for after it is not answered either.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
@@ -20,6 +21,9 @@ class LibraryThread {
 
     // Makes the call after those before it, and waits for nothing.
     void post(std::function<void()> call);
+
+    // Its end waits for nothing any more: what its calls wait for is known to have gone.
+    void leave_behind() { end_patience_ms_ = 0; }
 
     // Calls `tick` whenever nothing else was asked for in so long.
     void set_tick(std::function<void()> tick, int period_ms);
@@ -44,7 +48,7 @@ class LibraryThread {
     struct Shared;
     static void work(Shared& shared);
     const std::shared_ptr<Shared> shared_;
-    const std::chrono::milliseconds end_patience_;
+    std::atomic<int> end_patience_ms_;
 };
 
 }  // namespace ols

@@ -64,7 +64,8 @@ bool SpillFile::has_room(uint64_t bytes) const {
 Error SpillFile::disk_failed(const std::string& action, int error) const {
     const std::lock_guard lock(mutex_);
     std::string why = fmt::format("{} '{}', with {} MB there: {}", action, folder_, end_ >> 20, std::strerror(error));
-    if (error == ENOSPC || error == EDQUOT) why += "; free space there, or spill to a larger disk";
+    why += error == ENOSPC || error == EDQUOT ? "; free space there, or spill to a larger disk"
+                                              : "; check that disk and its cable, or spill to another";
     if (problem_.empty()) problem_ = why;
     return fail(why);
 }

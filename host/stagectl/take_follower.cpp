@@ -15,7 +15,7 @@ namespace ols {
 namespace {
 
 int exit_code_of(const nlohmann::json& take) {
-    if (!take.value("write_error", "").empty()) return 1;
+    if (!take.value("write_error", "").empty() || !take.value("/memory/problem"_json_pointer, "").empty()) return 1;
     const uint64_t missing = take.value("targets_missing", uint64_t(0)) + take.value("slots_left_out", uint64_t(0)) +
                              take.value("slots_missing_total", uint64_t(0));
     return missing > 0 ? 2 : 0;

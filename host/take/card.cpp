@@ -159,12 +159,15 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
     const auto report =
         record_take(board, {{camera, options.camera, std::nullopt, sink}}, sequence, stage, stop, monitor);
     if (!report.ok()) return report.error();
+    const CameraReport& account = report->cameras[0];
+    if (account.missing.of(Cause::camera_gone) > 0)
+        return fail("the calibration was cut short: " +
+                    (account.end.empty() ? report->board_end.text : account.end.text));
     if (card.frames() == 0 || dark.frames() == 0)
-        return fail(fmt::format(
-            "{} of {} frames could be identified, not enough to calibrate{}{}{}", card.frames() + dark.frames(),
-            report->slots_total, report->cameras[0].end.empty() ? "" : "; " + report->cameras[0].end.text,
-            report->board_end.empty() ? "" : "; " + report->board_end.text,
-            report->cameras[0].unfit_frame.empty() ? "" : "; frames came as " + report->cameras[0].unfit_frame));
+        return fail(fmt::format("{} of {} frames could be identified, not enough to calibrate{}{}",
+                                card.frames() + dark.frames(), report->slots_total,
+                                report->board_end.empty() ? "" : "; " + report->board_end.text,
+                                account.unfit_frame.empty() ? "" : "; frames came as " + account.unfit_frame));
 
     const double exposure_us = double(sequence.slots[2].exposure_ticks) / double(ticks_per_us);
     CameraCalibration planes{dark.mean(), card.mean()};

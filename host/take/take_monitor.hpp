@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "record/record_monitor.hpp"
@@ -16,6 +17,7 @@ struct OutputProgress {
     uint64_t targets_waiting = 0;    // whose frames are all decided, and that are not developed yet
     uint64_t targets_developed = 0;  // with what is waiting to be written
     uint64_t targets_written = 0, targets_missing = 0;
+    std::string write_error;  // what could not be written first, and why; empty while all could
     // Of the recording, by the board's ticks: from the last slot that is developed to the last one that could be, in the camera
     // that is furthest behind. 0 when nothing waits.
     uint64_t ticks_behind = 0;
@@ -45,6 +47,10 @@ class OutputMonitor {
     }
     void miss(uint64_t targets) {
         change([=](OutputProgress& p) { p.targets_missing += targets; });
+    }
+
+    void fail_to_write(const std::string& why) {
+        change([&](OutputProgress& p) { p.write_error = why; });
     }
 
     StageBeat& developer_beat(size_t camera) { return *developers_[camera].beat; }

@@ -27,7 +27,10 @@ void TargetWriter::write() {
         const Status status = guarded("cannot write to the archive", [&] {
             return std::visit([this](const auto& one) { return write(one); }, *work);
         });
-        if (!status.ok() && report_.error.empty()) report_.error = status.error().message;
+        if (!status.ok() && report_.error.empty()) {
+            report_.error = status.error().message;
+            monitor_.fail_to_write(report_.error);
+        }
         report_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     }
     beat.beat(StageActivity::ended);

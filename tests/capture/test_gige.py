@@ -1,28 +1,14 @@
 # SPDX-License-Identifier: MIT
 # The virtual stage's camera over GigE Vision on the loopback: the same take as by its ring, and what Aravis' own tool sees of it.
-import os
 import subprocess
+import sys
 
 import numpy as np
 
-from virtual_take import BIN, VirtualStage, read_lamps, read_plane
+from virtual_take import ROOT, VirtualStage, read_lamps, read_plane
 
-
-class Bridge:
-    """gige_bridge over a stage's ring, at an address of the loopback that no other test's process has; use it with `with`."""
-
-    def __init__(self, stage):
-        self.address = f"127.{1 + os.getpid() // 254 % 254}.{1 + os.getpid() % 254}.1"
-        command = [BIN / "gige_bridge", stage.folder / "cam0.ring", self.address]
-        self.process = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-    def __enter__(self):
-        assert self.process.stdout.readline() == "ready\n"
-        return self
-
-    def __exit__(self, *_):
-        self.process.stdin.close()
-        assert self.process.wait(60) == 0
+sys.path.append(str(ROOT / "tests/gige"))
+from gige_camera import GigeCamera  # noqa: E402
 
 
 def take(stage, archive, camera):
@@ -48,14 +34,14 @@ def test_a_take_over_gige_vision_is_that_of_the_ring_bit_for_bit(tmp_path):
     ring, gige = tmp_path / "ring.rfa", tmp_path / "gige.rfa"
     with VirtualStage(tmp_path / "a", "card.toml") as stage:
         take(stage, ring, True)
-    with VirtualStage(tmp_path / "b", "card.toml") as stage, Bridge(stage) as bridge:
-        assert features(bridge.address)["DeviceModelName"] == "Line"
-        report = take(stage, gige, f"aravis:{bridge.address}")
-        seen = features(bridge.address)  # as the take left it
+    with VirtualStage(tmp_path / "b", "card.toml") as stage, GigeCamera(stage.folder / "cam0.ring") as camera:
+        assert features(camera.address)["DeviceModelName"] == "Line"
+        report = take(stage, gige, f"aravis:{camera.address}")
+        seen = features(camera.address)  # as the take left it
     assert report["slots_missing"] == 0
-    (camera,) = report["cameras"]
-    assert (camera["frames"], camera["missing_ids"], camera["underrun"]) == (180, 0, 0), camera
-    assert camera["link"].startswith("GigE Vision, " + seen["PixelFormat"]), camera
+    (account,) = report["cameras"]
+    assert (account["frames"], account["missing_ids"], account["underrun"]) == (180, 0, 0), account
+    assert account["link"].startswith("GigE Vision, " + seen["PixelFormat"]), account
     assert seen["Width"] == "64" and seen["Height"] == "48", seen
     assert seen["PixelFormat"] in ("BayerRG12p", "BayerRG12Packed"), seen
     assert seen["TriggerMode"] == "On", seen

@@ -6,7 +6,7 @@ from stage_daemon import BIN, Daemon, Stage, until
 
 
 def pytest_configure():
-    for program in ("stagectl", "stagesim", "rf"):
+    for program in ("stagectl", "stagesim", "rf", "gige_bridge"):
         if not (BIN / program).exists():
             raise pytest.UsageError(f"{BIN / program} is missing: run `make host`")
 

@@ -8,6 +8,9 @@ import socket
 import subprocess
 import time
 
+import numpy as np
+import OpenEXR
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build/host/bin"
 SCENES = ROOT / "tools/stagesim/scenes"
@@ -107,6 +110,7 @@ source = "{camera or f'ring:{self.work}/cam0.ring'}"
         (folder / "sequences").mkdir(exist_ok=True)
         self.config.write_text(self.text)
         self.process = None
+        self.under = []  # what the program is run by, which becomes the program
 
     def __enter__(self):
         return self.start()
@@ -118,7 +122,7 @@ source = "{camera or f'ring:{self.work}/cam0.ring'}"
         self.log_path = self.folder / "serve.log"
         self.log = self.log_path.open("a+")
         self.process = subprocess.Popen(
-            [str(self.program), "serve", "--config", str(self.config)],
+            [*map(str, self.under), str(self.program), "serve", "--config", str(self.config)],
             stdout=self.log, stderr=self.log, env={**os.environ, **environment},
         )  # fmt: skip
         until(lambda: self.is_listening() or self.process.poll() is not None, 30, "the daemon")
@@ -186,6 +190,46 @@ source = "{camera or f'ring:{self.work}/cam0.ring'}"
         proc = pathlib.Path(f"/proc/{self.process.pid}")
         resident = int((proc / "statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
         return resident, len(list((proc / "fd").iterdir())), len(list((proc / "task").iterdir()))
+
+
+def bring_to(daemon, state):
+    """Into a state that lasts; the client that records, where there is one."""
+    if state == "armed":
+        daemon.run("arm")
+    if state == "recording":
+        daemon.run("record", "--seconds", "60", "--no-wait", "--slate", "cut")
+        until(lambda: daemon.call("status")["take"]["triggers_fired"] > 400)
+    assert daemon.state() == state
+
+
+def assert_takes_are_whole(daemon, targets_at_least):
+    """Every finished target reads, the rest is named."""
+    for take in daemon.run("takes", "--json")["takes"]:
+        assert take["state"] == "finished", take
+        done = subprocess.run(
+            [str(BIN / "rf"), "verify", take["archive"], "--json"], capture_output=True, text=True, timeout=60
+        )
+        report = json.loads(done.stdout)
+        assert len(report["intact"]) == take["targets_written"] >= targets_at_least, report
+
+
+def read_lamps(target):
+    """[lamp, y, x]"""
+    for part in OpenEXR.File(str(target), separate_channels=True).parts:
+        if part.header["name"] == "lamps":
+            return np.stack([part.channels[name].pixels for name in sorted(part.channels)])
+    raise AssertionError("no part of lamps")
+
+
+def assert_frames_have_their_slots(archive):
+    """In a take of single lamps of a scene that stands still: a frame that were given another slot would be another lamp's picture."""
+    first, *others = sorted((archive / "cam0").glob("target_??????.exr"))
+    truth = read_lamps(first)
+    for target in others:
+        lamps = read_lamps(target)
+        seen = lamps.any(axis=(1, 2))  # of the others no frame came
+        # Noise is 0.02 of it; lamps side by side differ by 0.07 in the middle of them, some by all of it.
+        assert np.abs(lamps - truth)[seen].max() < 0.05 * np.abs(truth).max(), target
 
 
 class Refused(Exception):

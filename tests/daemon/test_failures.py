@@ -8,28 +8,7 @@ import time
 
 import pytest
 
-from stage_daemon import BIN, Daemon, until
-
-
-def bring_to(daemon, state):
-    """Into a state that lasts; the client that records, where there is one."""
-    if state == "armed":
-        daemon.run("arm")
-    if state == "recording":
-        daemon.run("record", "--seconds", "60", "--no-wait", "--slate", "cut")
-        until(lambda: daemon.call("status")["take"]["triggers_fired"] > 400)
-    assert daemon.state() == state
-
-
-def assert_takes_are_whole(daemon, targets_at_least):
-    """Every finished target reads, the rest is named."""
-    for take in daemon.run("takes", "--json")["takes"]:
-        assert take["state"] == "finished", take
-        done = subprocess.run(
-            [str(BIN / "rf"), "verify", take["archive"], "--json"], capture_output=True, text=True, timeout=60
-        )
-        report = json.loads(done.stdout)
-        assert len(report["intact"]) == take["targets_written"] >= targets_at_least, report
+from stage_daemon import BIN, Daemon, assert_takes_are_whole, bring_to, until
 
 
 @pytest.mark.parametrize("state", ["idle", "armed", "recording"])

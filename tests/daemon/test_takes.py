@@ -6,23 +6,13 @@ import signal
 import subprocess
 import time
 
-import numpy as np
-import OpenEXR
 import pytest
 
-from stage_daemon import BIN, Refused, until
+from stage_daemon import BIN, Refused, read_lamps, until
 
 
 def verify(archive):
     return subprocess.run([str(BIN / "rf"), "verify", str(archive)], capture_output=True, text=True)
-
-
-def read_lamps(archive):
-    """[lamp, y, x] of the first target."""
-    for part in OpenEXR.File(str(archive / "cam0/target_000000.exr"), separate_channels=True).parts:
-        if part.header["name"] == "lamps":
-            return np.stack([part.channels[name].pixels for name in sorted(part.channels)])
-    raise AssertionError("no part of lamps")
 
 
 def test_takes_are_named_by_slate_and_number(daemon):
@@ -48,7 +38,8 @@ def test_a_take_of_the_daemon_is_a_take_of_the_command_line(alone, tmp_path):
     daemon.stage.start()
     run = [BIN / "stagectl", "run", "--basis", "single", "--stage", daemon.config, "--nominal", "--cycles", "3"]
     subprocess.run([*map(str, run), "-o", str(tmp_path / "hand.rfa")], check=True, capture_output=True)
-    by_daemon, by_hand = (read_lamps(path) for path in (daemon.takes / "same_001.rfa", tmp_path / "hand.rfa"))
+    archives = (daemon.takes / "same_001.rfa", tmp_path / "hand.rfa")
+    by_daemon, by_hand = (read_lamps(path / "cam0/target_000000.exr") for path in archives)
     assert by_daemon.shape == (156, 24, 32) and (by_daemon == by_hand).all() and by_daemon.max() > 0.1
 
 

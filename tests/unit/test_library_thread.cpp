@@ -42,6 +42,21 @@ TEST(LibraryThread, a_call_that_hangs_is_not_waited_for_and_keeps_what_it_holds_
     EXPECT_EQ(held.use_count(), 1) << "its end was waited for";
 }
 
+TEST(LibraryThread, one_whose_device_has_gone_is_left_behind_and_keeps_what_it_holds_until_it_ends) {
+    const auto held = std::make_shared<int>(7);
+    std::promise<void> ending, ended;
+    {
+        LibraryThread library(1'000'000'000);
+        library.post([held, end = ending.get_future().share()] { end.wait(); });
+        library.post([&] { ended.set_value(); });
+        library.leave_behind();
+    }
+    EXPECT_EQ(held.use_count(), 2) << "its end was not waited for";
+    ending.set_value();
+    ended.get_future().wait();
+    EXPECT_EQ(held.use_count(), 1);
+}
+
 TEST(LibraryThread, ticks_while_nothing_is_asked_and_no_more_once_it_is_taken_back) {
     LibraryThread library;
     std::promise<void> ticked;

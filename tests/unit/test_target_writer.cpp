@@ -3,6 +3,7 @@
 // links: ols_take
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <set>
 
 #include "small_disk.hpp"
@@ -88,6 +89,23 @@ TEST_F(SmallDisks, a_disk_that_another_program_fills_to_the_last_byte_still_take
         if (code == no_mount) GTEST_SKIP() << "mounting a small disk needs rights that are not given here";
         EXPECT_EQ(code, 0);
     }
+}
+
+TEST_F(SmallDisks, what_could_not_be_written_first_is_told_to_whoever_looks_at_the_running_take) {
+    auto archive = ArchiveWriter::create(path, take_info(1));
+    std::ofstream(path + "/cam0") << "no folder";
+    StageBeats beats;
+    OutputMonitor monitor(beats, 0, 1, 57'870);
+    ArchiveSink sink(*archive);
+    TargetWriter writer(sink, monitor);
+    for (uint32_t index : {0u, 1u})
+        writer.add(
+            TargetOutcome{0, index, std::make_unique<Target>(numbered_target(1, 8, 8, Cfa::none, index)), "", {}});
+    const auto report = writer.finish();
+    EXPECT_EQ(report.missing, 2);
+    EXPECT_EQ(monitor.progress().write_error, report.error);
+    EXPECT_TRUE(report.error.starts_with("target 0: ")) << report.error;
+    EXPECT_NE(report.error.find("Not a directory"), std::string::npos) << report.error;
 }
 
 TEST_F(SmallDisks, runs_of_targets_that_were_never_recorded_are_one_line_and_one_entry) {
