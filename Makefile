@@ -4,9 +4,10 @@
 PYTHON := .venv/bin/python
 HOST := build/host
 CHECKED := build/checked
+THREADS := build/threads
 SIDE_BY_SIDE := $(MAKE) --no-print-directory -j2 --output-sync=target
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test soak guest-test fuzz-smoke \
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test daemon-test-addresses daemon-test-threads soak guest-test fuzz-smoke \
         fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
@@ -69,6 +70,16 @@ noise: all ## Wenger's SNR comparison on the virtual stage, and what designed ba
 daemon-test: all ## the daemon: its API, takes, failures in each state, on the virtual stage
 	@$(PYTHON) -m pytest -q tests/daemon
 
+daemon-test-addresses: all ## the same, the daemon with AddressSanitizer and UndefinedBehaviorSanitizer
+	@test -e $(CHECKED)/build.ninja || cmake -S . -B $(CHECKED) -G Ninja -DOLS_SANITIZE=ON >/dev/null
+	@ninja -C $(CHECKED) --quiet stagectl
+	@SERVE=$(CHECKED)/bin/stagectl $(PYTHON) -m pytest -q tests/daemon
+
+daemon-test-threads: all ## the same, the daemon with ThreadSanitizer
+	@test -e $(THREADS)/build.ninja || cmake -S . -B $(THREADS) -G Ninja -DOLS_SANITIZE_THREADS=ON -DOLS_TESTS=OFF >/dev/null
+	@ninja -C $(THREADS) --quiet stagectl
+	@SERVE=$(THREADS)/bin/stagectl TSAN_OPTIONS=suppressions=tests/daemon/threads.supp $(PYTHON) -m pytest -q tests/daemon
+
 soak: all ## an hour and more of takes with random faults by the daemon (TAKES=n, SEED=n)
 	@SOAK_TAKES=$(or $(TAKES),1000) SOAK_SEED=$(or $(SEED),1) $(PYTHON) -m pytest -q tests/daemon/test_service.py -k random_faults
 
@@ -106,4 +117,4 @@ install: host ## install the programs (DESTDIR, PREFIX)
 	@cmake --install $(HOST) --prefix $(or $(PREFIX),/usr/local)
 
 clean: ## remove what was built (not the caches)
-	rm -rf $(HOST) $(CHECKED) build/firmware out
+	rm -rf $(HOST) $(CHECKED) $(THREADS) build/firmware out

@@ -81,6 +81,8 @@ class Camera {
     virtual uint64_t watermark_ns() const = 0;
 
     virtual CameraCounts counts() const = 0;
+    // Frames that wait in its buffers to be read, at most.
+    virtual size_t buffers() const { return buffers_max; }
     virtual CameraState state() const = 0;
 
     // Frames that are read from now on have their samples in what is lent, where the driver makes them as they are read (new_frame());

@@ -63,6 +63,8 @@ class RingCamera : public Camera {
         return counts;
     }
 
+    size_t buffers() const override { return ring_.slots(); }
+
     CameraState state() const override {
         switch (ring_.writer()) {
             case RingReader::Writer::live: return {};

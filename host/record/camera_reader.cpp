@@ -12,9 +12,8 @@ namespace ols {
 
 namespace {
 
-// Frames that wait in a camera's own buffers, at most: 1024 of GigE Vision's, 256 of the virtual stage's ring, 32 of V4L2's; and some that
-// were being filled or read, and the one behind the gap.
-constexpr int backlog_max = Camera::buffers_max + 76;
+// Beside those that wait in a camera's own buffers: some that were being filled or read, and the one behind the gap.
+constexpr size_t beside_buffers = 76;
 
 // Whether the samples are there, so that they can be looked at at all, and of the stage's size and colour filter.
 bool is_whole(const Frame& frame, const CameraConfig& config) {
@@ -27,15 +26,16 @@ bool is_whole(const Frame& frame, const CameraConfig& config) {
 }  // namespace
 
 CameraReader::CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue,
-                           RecordMonitor& monitor, size_t place)
+                           RecordMonitor& monitor, size_t index)
     : camera_(camera),
       config_(config),
       options_(std::move(options)),
       bits_(config),
       queue_(queue),
       monitor_(monitor),
-      place_(place),
-      beat_(monitor.stages().add(fmt::format("camera {} reader", place))),
+      index_(index),
+      backlog_max_(camera.buffers() + beside_buffers),
+      beat_(monitor.stages().add(fmt::format("camera {} reader", index))),
       dropped_before_(camera.counts().dropped) {
     camera_.show_to(&look_);
     thread_ = std::thread([this] {
@@ -67,12 +67,12 @@ void CameraReader::read() {
         if (frame) {
             enqueue(std::move(*frame));
             if (options_.room->waits_for_disk())
-                frames_behind_disk_ = backlog_max;  // it may have been spilled just now
+                frames_behind_disk_ = backlog_max_;  // it may have been spilled just now
             continue;
         }
         options_.room->give_back_place();
         // Nothing is left in its buffers. What it dropped before this, it may tell with the next frame, as late as that comes.
-        frames_behind_disk_ = std::min(frames_behind_disk_, 1);
+        frames_behind_disk_ = std::min<size_t>(frames_behind_disk_, 1);
         queue_.push(CameraPause{watermark_ns, std::move(state), disk_drops_, host_drops_});
         if (!is_live) return;
     }
@@ -84,7 +84,7 @@ bool CameraReader::take_place() {
     if (options_.room->take_place(std::chrono::milliseconds(0))) return true;
     const auto look = [this] {
         if (options_.room->waits_for_disk() || (options_.waits_for_disk && options_.waits_for_disk()))
-            frames_behind_disk_ = backlog_max;
+            frames_behind_disk_ = backlog_max_;
     };
     look();
     const bool has_place = options_.room->take_place(std::chrono::milliseconds(pause_ms));
@@ -98,7 +98,7 @@ void CameraReader::count_drops() {
     if (more == 0) return;
     (frames_behind_disk_ > 0 ? disk_drops_ : host_drops_) += more;
     monitor_.change_camera(
-        place_, [this](CameraProgress& camera) { camera.disk_drops = disk_drops_, camera.host_drops = host_drops_; });
+        index_, [this](CameraProgress& camera) { camera.disk_drops = disk_drops_, camera.host_drops = host_drops_; });
 }
 
 // A sensor may saturate below the largest count of its format, and few cameras say where their black is: the stage does.
@@ -122,7 +122,7 @@ void CameraReader::enqueue(Frame frame) {
         news.bits = bits_.read(frame, look_.hash());
     }
     news.frame = options_.room->adopt(std::move(frame));
-    monitor_.change_camera(place_, [](CameraProgress& camera) { ++camera.frames_received; });
+    monitor_.change_camera(index_, [](CameraProgress& camera) { ++camera.frames_received; });
     queue_.push(std::move(news));
 }
 

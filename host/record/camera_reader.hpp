@@ -48,9 +48,9 @@ class CameraReader {
     static constexpr int pause_ms = 20;
 
     // Reads into the queue until it is destroyed. The camera was started.
-    // `place`: the camera's in the monitor, which knows it.
+    // `index`: the camera's among the stage's; the monitor knows it.
     CameraReader(Camera& camera, const CameraConfig& config, CameraReaderOptions options, RecordQueue& queue,
-                 RecordMonitor& monitor, size_t place);
+                 RecordMonitor& monitor, size_t index);
     ~CameraReader();
 
     // Frames read so far.
@@ -72,12 +72,12 @@ class CameraReader {
     FrameLook look_;
     RecordQueue& queue_;
     RecordMonitor& monitor_;
-    const size_t place_;
+    const size_t index_, backlog_max_;
     StageBeat& beat_;
     const uint64_t dropped_before_;
     std::atomic<uint64_t> disk_drops_ = 0, host_drops_ = 0;
     std::atomic<uint64_t> arrivals_ = 0;
-    int frames_behind_disk_ = 0;  // still to be read, that may have come while the disk held the room
+    size_t frames_behind_disk_ = 0;  // still to be read, that may have come while the disk held the room
     std::atomic<bool> end_ = false;
     std::thread thread_;
 };

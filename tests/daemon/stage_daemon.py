@@ -13,6 +13,7 @@ import OpenEXR
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build/host/bin"
+SERVE = ROOT / os.environ.get("SERVE", BIN / "stagectl")  # whose daemon is tested: one with a sanitizer, mostly
 SCENES = ROOT / "tools/stagesim/scenes"
 WIDTH, HEIGHT = 32, 24
 
@@ -81,7 +82,7 @@ class Stage:
 class Daemon:
     """`stagectl serve`, of a stage in `folder`; with `with`."""
 
-    def __init__(self, folder, settings="", stage="", program=BIN / "stagectl", camera=None):
+    def __init__(self, folder, settings="", stage="", program=SERVE, camera=None):
         self.folder, self.work, self.program = folder, folder / "work", program
         self.work.mkdir(parents=True, exist_ok=True)
         self.socket, self.takes, self.config = folder / "run/control.sock", folder / "takes", self.work / "stage.toml"
@@ -136,6 +137,8 @@ source = "{camera or f'ring:{self.work}/cam0.ring'}"
         if self.process and self.process.poll() is None:
             self.process.send_signal(how)
             self.process.wait(patience)
+        found = self.read_log().find("Sanitizer")
+        assert found < 0, self.read_log()[max(found - 200, 0):][:6000]
         return self.process.returncode
 
     def read_log(self):
