@@ -148,7 +148,9 @@ void Conductor::change_state(DaemonState state, const std::string& text, std::op
 void Conductor::enter_fault(const std::string& why, bool is_latched) {
     {
         const std::lock_guard lock(mutex_);
-        const bool is_known = now_.state == DaemonState::fault && now_.fault == why;
+        const bool is_in_fault = now_.state == DaemonState::fault;
+        if (is_in_fault && now_.fault_is_latched && !is_latched) return;  // who looks is to see what came first
+        const bool is_known = is_in_fault && now_.fault == why;
         now_.fault = why;
         now_.fault_is_latched |= is_latched;
         if (is_known) return;

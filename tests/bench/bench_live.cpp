@@ -112,7 +112,7 @@ class Live {
 constexpr const char* lost_unit = "slots and targets lost";
 
 void measure_capacity(Bench& bench, Live& live) {
-    const int cycles = live.is_full() ? 12 : 2;
+    const int cycles = live.is_full() ? 36 : 2;
     std::vector<Setting> settings;
     if (bench.measures()) (void)live.recording("s159", cycles), (void)live.recording("single", cycles);
     Setting stage{"the recording itself", {}, {}, 2};
@@ -126,7 +126,7 @@ void measure_capacity(Bench& bench, Live& live) {
                    .default_setting = "s159",
                    .why_off_front = "the recording is what it is held against, and its basis is chosen for its noise.",
                    .settings = settings,
-                   .most_rounds = 7});
+                   .most_rounds = 5});
 }
 
 void measure_pace(Bench& bench, Live& live) {

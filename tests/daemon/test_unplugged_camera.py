@@ -65,6 +65,8 @@ def test_a_camera_that_goes_away_is_a_fault_that_names_it(on_gige, state, how):
     if state in ("recording", "calibrating"):
         kinds = [event["event"] for event in daemon.events()]
         assert kinds.index("dark") < kinds.index("fault")
+    if state != "idle":  # later looks at the devices find other words for it
+        assert daemon.call("status")["fault"] == fault["fault"]
     if how == "unplugged":
         camera.start()
     else:
