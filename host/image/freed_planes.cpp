@@ -124,6 +124,11 @@ FreedPlanes& freed() {
     return *planes;
 }
 
+bool keeps_planes() {
+    const std::lock_guard lock(freed().mutex);
+    return freed().keeps;
+}
+
 }  // namespace
 
 bool keep_freed_planes() {
@@ -136,6 +141,23 @@ bool keep_freed_planes() {
     const std::lock_guard lock(freed().mutex);
     freed().keeps = true;
     return keeps_blocks && keeps_end;
+}
+
+void prepare_planes(size_t bytes, size_t count) {
+    if (bytes < plane_bytes_min || !keeps_planes()) return;
+    constexpr size_t page_bytes = 4096;
+    std::vector<void*> planes;
+    try {
+        planes.reserve(count = std::min(count, kept_bytes_max / bytes));
+        while (planes.size() < count) planes.push_back(take_plane(bytes));
+    } catch (const std::bad_alloc&) {
+    }
+    for (void* const plane : planes) {
+        auto* const samples = static_cast<volatile char*>(plane);
+        for (size_t at = 0; at < bytes; at += page_bytes) samples[at] = 0;
+        samples[bytes - 1] = 0;
+    }
+    for (size_t n = planes.size(); n-- > 0;) give_back_plane(planes[n], bytes);
 }
 
 void* take_plane(size_t bytes) {

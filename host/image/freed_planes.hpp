@@ -13,6 +13,10 @@ namespace ols {
 // settings (a sanitizer's): other blocks may go back, slower, and otherwise the same.
 bool keep_freed_planes();
 
+// Has so many planes there with their memory cleared, as far as they are kept, so that those who make them first need not wait for that.
+// Where there is not so much memory, fewer.
+void prepare_planes(size_t bytes, size_t count);
+
 // What PlaneAllocator calls: memory that begins on a cache line. Blocks of less than plane_bytes_min are not kept, nor, once all that
 // lies beside them was given back, more than kept_bytes_max altogether. Throws std::bad_alloc.
 void* take_plane(size_t bytes);

@@ -61,6 +61,7 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
     options.period = std::chrono::nanoseconds(take.sequence.slots.front().period_ticks * 1'000'000'000ull / tick_hz);
     const size_t least = frames_held(take, outputs);
     options.frames_max = least;
+    options.is_touched = true;  // a page that is cleared when a frame comes holds that one up
     if (memory.ram_bytes > 0) {
         uint64_t bytes = 0;  // of a frame of each camera
         for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(camera.frame_bytes());
@@ -72,7 +73,6 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
                             memory.ram_bytes / 1'000'000, frames, least, least * bytes / 1'000'000 + 1));
         // More than the take has are not needed.
         options.frames_max = size_t(std::clamp<uint64_t>(frames, least, take.sequence.trigger_count() + least));
-        options.is_touched = true;
     }
     for (const CameraConfig& camera : take.stage.cameras) {
         options.frame_bytes = camera.frame_bytes();

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <numeric>
 
+#include "image/freed_planes.hpp"
 #include "take/camera_developer.hpp"
 #include "take/frame_rooms.hpp"
 #include "take/provenance.hpp"
@@ -152,6 +154,15 @@ std::optional<double> measured_black(const Calibration& calibration, size_t came
 
 namespace {
 
+// Before the light: of each output and camera the planes of the target that is developed and of the one that is written.
+void prepare_target_planes(const TakeDescription& take, size_t outputs) {
+    std::map<size_t, size_t> planes;  // how many of so many bytes
+    for (const CameraConfig& camera : take.stage.cameras)
+        planes[size_t(camera.width) * size_t(camera.height) * sizeof(float)] +=
+            2 * outputs * size_t(take.sequence.basis.images()) * size_t(samples_per_pixel(camera.cfa));
+    for (const auto& [bytes, count] : planes) prepare_planes(bytes, count);
+}
+
 // `record_into` records into the cameras' sinks, from whatever the take comes.
 template <typename Record>
 Result<TakeReport> develop_take(const TakeDescription& take, const nlohmann::json& origin, const TakeSinks& sinks,
@@ -214,6 +225,7 @@ Result<TakeReport> run_take(const TakeDescription& take, const TakeDevices& devi
     TakeMonitor& monitor = sinks.monitor ? *sinks.monitor : own_monitor;
     const auto rooms = make_frame_rooms(take, sinks.outputs);
     if (!rooms.ok()) return rooms.error();
+    prepare_target_planes(take, sinks.outputs.size());
     return develop_take(take, origin_of(devices.board), sinks, monitor, *rooms,
                         [&](const std::vector<RecordSink>& camera_sinks) {
                             std::vector<RecordedCamera> recorded;

@@ -141,8 +141,8 @@ void measure_pace(Bench& bench, Live& live) {
                    .error_unit = lost_unit,
                    .peer = stage.name,
                    .default_setting = "s159",
-                   .why_off_front =
-                       "the recording is what it is held against; what is longer is how far it was behind at its end.",
+                   .why_off_front = "the recording is what it is held against; longer by its memory, made before, and "
+                                    "by how far it was behind.",
                    .settings = settings,
                    .most_rounds = 3});
 }
@@ -204,6 +204,7 @@ void measure_shares(Bench& bench, Live& live) {
          .error_unit = "of none",
          .peer = "memory: the C library's copy",
          .default_setting = "receive: copy, block means and hash",
+         .why_off_front = "a copy alone is what it is held against; it looks at every sample besides.",
          .settings = {{"memory: the C library's copy", each([](const Recording&, const Frame& frame) {
                            copy.samples.assign(frame.samples.begin(), frame.samples.end());
                        }),

@@ -167,6 +167,7 @@ void LiveStage::put(uint64_t trigger) {
     }
     frame.frame_id = trigger + 1;
     frame.timestamp_ns = camera_begin_ns + (test::PlayedBoard::first_rise_ticks + trigger * period_ticks_) * 8;
+    frame.dropped_before = header.dropped.load(std::memory_order_relaxed);
     // No exposure has the bits of another.
     reinterpret_cast<uint16_t*>(record + sizeof frame)[1000 + cycle % 1000] ^= 1;
     header.head.store(++head_, std::memory_order_release);

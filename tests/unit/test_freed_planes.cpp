@@ -4,6 +4,7 @@
 #include "image/freed_planes.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
 #include <cstdint>
 #include <set>
@@ -74,6 +75,22 @@ TEST(FreedPlanes, do_not_overlap_and_keep_what_is_written_in_them) {
         }
         for (unsigned char* plane : lent) give_back_plane(plane, size);
     }
+}
+
+TEST(FreedPlanes, that_were_prepared_are_there_page_by_page) {
+    (void)keep_freed_planes();
+    constexpr size_t size = 3 << 20, count = 7, page = 4096;
+    prepare_planes(size, count);
+    std::vector<void*> lent;
+    for (size_t n = 0; n < count; ++n) {
+        lent.push_back(take_plane(size));
+        auto* const first = reinterpret_cast<unsigned char*>(uintptr_t(lent.back()) / page * page);
+        std::vector<unsigned char> resident((static_cast<unsigned char*>(lent.back()) + size - first + page - 1) /
+                                            page);
+        ASSERT_EQ(mincore(first, resident.size() * page, resident.data()), 0);
+        for (const unsigned char is_there : resident) ASSERT_TRUE(is_there & 1) << n;
+    }
+    for (void* plane : lent) give_back_plane(plane, size);
 }
 
 TEST(FreedPlanes, a_plane_of_more_bytes_than_there_are_is_an_exception) {
