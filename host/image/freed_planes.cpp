@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <new>
@@ -78,7 +79,7 @@ struct FreedPlanes {
         ASAN_POISON_MEMORY_REGION(plane, bytes);
         by_size[bytes].push_back(plane);  // has room (add_slab())
         kept_bytes += bytes;
-        if (--slab->second.lent == 0 && kept_bytes > kept_bytes_max) unmap(slab);
+        if (--slab->second.lent == 0) keep_to_bound(slab);
         return true;
     }
 
@@ -107,6 +108,16 @@ struct FreedPlanes {
         ASAN_POISON_MEMORY_REGION(made.memory, made.bytes);
         for (size_t n = made.planes; n-- > 0;) free.push_back(made.plane(n));  // the first is taken first
         kept_bytes += made.planes * bytes;
+    }
+
+    // Planes of the size that came back last are the likeliest to be asked for next: theirs go when no others are left.
+    void keep_to_bound(SlabPlace newest) {
+        for (auto slab = slabs.begin(); slab != slabs.end() && kept_bytes > kept_bytes_max;) {
+            const auto next = std::next(slab);
+            if (slab->second.lent == 0 && slab->second.plane_bytes != newest->second.plane_bytes) unmap(slab);
+            slab = next;
+        }
+        if (kept_bytes > kept_bytes_max) unmap(newest);
     }
 
     void unmap(SlabPlace place) {

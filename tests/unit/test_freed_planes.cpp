@@ -53,6 +53,18 @@ TEST(FreedPlanes, beyond_the_bound_go_back) {
     for (void* plane : again) give_back_plane(plane, huge);
 }
 
+TEST(FreedPlanes, of_another_size_go_back_first) {
+    (void)keep_freed_planes();
+    constexpr size_t others = kept_bytes_max / 3, own = kept_bytes_max / 4;
+    std::set<void*> lent;
+    for (int n = 0; n < 3; ++n) lent.insert(take_plane(others));
+    for (void* plane : lent) give_back_plane(plane, others);
+    void* const plane = take_plane(own);
+    give_back_plane(plane, own);
+    EXPECT_EQ(take_plane(own), plane);
+    give_back_plane(plane, own);
+}
+
 TEST(FreedPlanes, that_were_made_before_they_were_kept_go_back_to_where_they_came_from) {
     auto* const small = static_cast<char*>(take_plane(plane_bytes_min - 1));  // as those are: from the heap
     small[0] = 1;
