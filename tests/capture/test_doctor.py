@@ -4,12 +4,15 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 
 import pytest
 
 import confined
-from test_gige import Bridge
 from virtual_take import BIN, ROOT, VirtualStage, sequence, verify
+
+sys.path.append(str(ROOT / "tests/gige"))
+from gige_camera import GigeCamera  # noqa: E402
 
 PAGE = ROOT / "docs/checking_the_machine.md"
 
@@ -113,12 +116,12 @@ def test_a_take_needs_no_more_than_the_service_may_do(tmp_path, options):
 @pytest.mark.skipif(confined.why_not() != "", reason=confined.why_not() or "-")
 def test_a_take_over_gige_needs_no_more_than_the_service_may_do(tmp_path):
     archive = tmp_path / "take.rfa"
-    with VirtualStage(tmp_path / "stage", "card.toml") as stage, Bridge(stage) as bridge:
-        _, found, _ = doctor(command=stage.command("doctor", "--json", "--quick", camera=f"aravis:{bridge.address}"))
+    with VirtualStage(tmp_path / "stage", "card.toml") as stage, GigeCamera(stage.folder / "cam0.ring") as gige:
+        _, found, _ = doctor(command=stage.command("doctor", "--json", "--quick", camera=f"aravis:{gige.address}"))
         assert statuses(found["camera.setup"]) == ["ok"]
         assert found["network.mtu"][0]["found"].endswith(" bytes on lo")
         options = ["--sequence", sequence("s159"), "--nominal", "--patience", 200, "-o", archive]
-        done = confined.run(stage.command("run", *options, camera=f"aravis:{bridge.address}"))
+        done = confined.run(stage.command("run", *options, camera=f"aravis:{gige.address}"))
     assert done.returncode == 0, (done.returncode, done.stderr)
     assert verify(archive).returncode == 0
 
