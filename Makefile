@@ -7,8 +7,8 @@ CHECKED := build/checked
 THREADS := build/threads
 SIDE_BY_SIDE := $(MAKE) --no-print-directory -j2 --output-sync=target
 
-.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test daemon-test-addresses daemon-test-threads soak guest-test fuzz-smoke \
-        fuzz mutation lint lint-fast format flash install clean
+.PHONY: all help setup firmware host checked assets demo test unit stability benchmarks bench bench-smoke noise hil matrix daemon-test \
+        daemon-test-addresses daemon-test-threads soak guest-test fuzz-smoke fuzz mutation lint lint-fast format flash install clean
 
 all: firmware host ## build the firmware image and the host programs
 

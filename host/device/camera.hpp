@@ -100,8 +100,11 @@ class Camera {
         return frame;
     }
 
-    // For a frame of which all but the samples is set.
-    void copy_rows(const std::byte* samples, Frame& frame) { row_copy_.copy(samples, frame, watcher_); }
+    // For drivers whose frames lie in memory as they are to be: the samples of a frame of which all else is set.
+    void copy_rows(const std::byte* samples, Frame& frame) {
+        if (lender_) frame.samples = lender_->lend();
+        row_copy_.copy(samples, frame, watcher_);
+    }
 
   private:
     std::shared_ptr<SampleLender> lender_;

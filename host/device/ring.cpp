@@ -332,22 +332,17 @@ uint64_t RingReader::frames_waiting() const {
     return state_->problem ? 0 : waiting;
 }
 
-std::optional<Frame> RingReader::read(int timeout_ms) {
-    return read(
-        timeout_ms, [] { return Frame(); },
-        [](const std::byte* samples, Frame& frame) {
-            frame.samples.assign(samples, samples + size_t(frame.pitch_bytes) * frame.height);
-        });
+void RingReader::copy_as_they_are(const std::byte* samples, Frame& frame) {
+    frame.samples.assign(samples, samples + size_t(frame.pitch_bytes) * frame.height);
 }
 
-std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame()>& new_frame,
-                                      const std::function<void(const std::byte*, Frame&)>& copy_rows) {
+std::optional<Frame> RingReader::read(int timeout_ms, const CopyRows& copy_rows) {
     RingHeader& header = state_->mapping.header();
     const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
     while (state_->running && !state_->problem) {
         const uint32_t seen = header.head_futex.load(std::memory_order_acquire);
         if (frames_waiting() > 0) {
-            Frame frame = take_frame(new_frame(), copy_rows);
+            Frame frame = take_frame(copy_rows);
             if (state_->mapping.memory.cut() || state_->problem) return std::nullopt;
             return frame;
         }
@@ -358,11 +353,12 @@ std::optional<Frame> RingReader::read(int timeout_ms, const std::function<Frame(
     return std::nullopt;
 }
 
-Frame RingReader::take_frame(Frame frame, const std::function<void(const std::byte*, Frame&)>& copy_rows) {
+Frame RingReader::take_frame(const CopyRows& copy_rows) {
     const RingMapping& mapping = state_->mapping;
     const std::byte* record = mapping.record(state_->tail);
     RingFrame meta;
     std::memcpy(&meta, record, sizeof meta);
+    Frame frame;
     frame.camera = meta.camera;
     frame.stamp = {meta.frame_id, meta.timestamp_ns};
     frame.width = meta.width;

@@ -138,10 +138,9 @@ class RingReader {
     // The next frame, copied out, or nothing when none came within `timeout_ms` (a pause for the caller to look at
     // its stop flag; nothing else is decided by it). One that is larger than the header's content, of another format, or whose
     // rows are not in its bytes comes without samples.
-    // `new_frame`: makes the frame that is read into; `copy_rows`: copies its samples, of which all else is set.
-    std::optional<Frame> read(int timeout_ms, const std::function<Frame()>& new_frame,
-                              const std::function<void(const std::byte*, Frame&)>& copy_rows);
-    std::optional<Frame> read(int timeout_ms);
+    // `copy_rows`: copies the samples of a frame of which all else is set.
+    using CopyRows = std::function<void(const std::byte*, Frame&)>;
+    std::optional<Frame> read(int timeout_ms, const CopyRows& copy_rows = copy_as_they_are);
     uint64_t watermark_ns() const;
     // Frames that found no room, of those before the last one that was read; once all are read, of all.
     uint64_t dropped() const;
@@ -160,7 +159,8 @@ class RingReader {
     struct State;
     explicit RingReader(std::unique_ptr<State>);
     uint64_t frames_waiting() const;
-    Frame take_frame(Frame frame, const std::function<void(const std::byte*, Frame&)>& copy_rows);
+    static void copy_as_they_are(const std::byte* samples, Frame& frame);
+    Frame take_frame(const CopyRows& copy_rows);
     void note_drops(uint64_t before_frame);
     std::unique_ptr<State> state_;
 };

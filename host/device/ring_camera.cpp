@@ -42,9 +42,8 @@ class RingCamera : public Camera {
         const auto until = Clock::now() + std::chrono::milliseconds(timeout_ms);
         // Stale frames do not prolong the wait, be there ever so many.
         for (auto left = std::chrono::milliseconds(timeout_ms);;) {
-            auto frame = ring_.read(
-                int(left.count()), [this] { return new_frame(); },
-                [this](const std::byte* samples, Frame& to) { copy_rows(samples, to); });
+            auto frame =
+                ring_.read(int(left.count()), [this](const std::byte* samples, Frame& to) { copy_rows(samples, to); });
             if (!frame) return std::nullopt;
             if (delivery_.take(frame->stamp)) {
                 frame->camera = index_;

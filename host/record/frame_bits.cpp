@@ -32,10 +32,6 @@ size_t samples_in_range(std::span<const uint16_t> samples, uint16_t saturated) {
     return count;
 }
 
-XXH3_state_t* state_of(void* state) {
-    return static_cast<XXH3_state_t*>(state);
-}
-
 }  // namespace
 
 RowHash::RowHash() : state_(XXH3_createState()) {
@@ -43,25 +39,25 @@ RowHash::RowHash() : state_(XXH3_createState()) {
     begin();
 }
 
-void RowHash::Release::operator()(void* state) const {
-    XXH3_freeState(state_of(state));
+void RowHash::Release::operator()(XXH3_state_s* state) const {
+    XXH3_freeState(state);
 }
 
 void RowHash::begin() {
-    XXH3_64bits_reset(state_of(state_.get()));
+    XXH3_64bits_reset(state_.get());
 }
 
 void RowHash::add(const Frame& frame, uint32_t rows, const std::byte* samples) {
     const size_t pitch = frame.pitch_bytes, row_bytes = row_samples(frame) * sample_bytes(frame.format);
     if (pitch == row_bytes) {
-        XXH3_64bits_update(state_of(state_.get()), samples, row_bytes * rows);
+        XXH3_64bits_update(state_.get(), samples, row_bytes * rows);
         return;
     }
-    for (size_t y = 0; y < rows; ++y) XXH3_64bits_update(state_of(state_.get()), samples + y * pitch, row_bytes);
+    for (size_t y = 0; y < rows; ++y) XXH3_64bits_update(state_.get(), samples + y * pitch, row_bytes);
 }
 
 uint64_t RowHash::value() const {
-    return XXH3_64bits_digest(state_of(state_.get()));
+    return XXH3_64bits_digest(state_.get());
 }
 
 double equal_chance(double sigma_counts) {

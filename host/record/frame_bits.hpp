@@ -11,6 +11,8 @@
 #include "image/frame.hpp"
 #include "stage/stage.hpp"
 
+struct XXH3_state_s;  // xxhash.h
+
 namespace ols {
 
 struct FrameBits {
@@ -30,9 +32,9 @@ class RowHash {
 
   private:
     struct Release {
-        void operator()(void* state) const;
+        void operator()(XXH3_state_s* state) const;
     };
-    std::unique_ptr<void, Release> state_;
+    std::unique_ptr<XXH3_state_s, Release> state_;
 };
 
 // Reads frames of one camera. Thread-safe.

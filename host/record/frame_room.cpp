@@ -47,12 +47,12 @@ Status FrameRoom::map_memory() {
     if (error == 0) {
         memory_ = static_cast<std::byte*>(memory);
         (void)madvise(memory_, bytes, MADV_HUGEPAGE);  // only quicker
-        if (options_.is_touched) error = touch(memory_, bytes);
+        error = touch(memory_, bytes);
     }
     if (error != 0)
         return fail(
-            fmt::format("{} MB of memory for frames are not to be had: {}; close other programs, or give less "
-                        "(--memory-mb, or [daemon] memory_mb)",
+            fmt::format("{} MB of memory for frames are not to be had: {}; close other programs, or give less, if "
+                        "any was given (--memory-mb, or [daemon] memory_mb)",
                         bytes / 1'000'000, std::strerror(error)));
     free_.reserve(options_.frames_max);
     for (size_t n = options_.frames_max; n-- > 0;) free_.push_back(memory_ + n * stride);

@@ -34,7 +34,6 @@ class FrameRoom : public SampleLender, public std::enable_shared_from_this<Frame
         size_t frames_max = 0;
         size_t frame_bytes = 0;             // of the camera's samples
         size_t reserve = 0;                 // of frames_max: buffers for those brought back from the disk
-        bool is_touched = false;            // all memory is there before the take, or it does not begin
         std::shared_ptr<SpillFile> spill;   // null: nothing is spilled
         std::chrono::nanoseconds period{};  // from one frame to the next: a disk that takes longer for one is late
     };
@@ -42,7 +41,7 @@ class FrameRoom : public SampleLender, public std::enable_shared_from_this<Frame
     // What a frame takes of the memory.
     static size_t bytes_a_frame(size_t frame_bytes);
 
-    // Errors: the memory is not to be had.
+    // All memory is there from then on: a page that the kernel clears when a frame comes holds that one up. Errors: it is not to be had.
     static Result<std::shared_ptr<FrameRoom>> create(Options options);
     ~FrameRoom() override;
 

@@ -102,12 +102,6 @@ FrameSummary BlockSums::summary(double black_counts, const NoiseModel& noise) co
     return summary;
 }
 
-FrameSummary summarize_frame(const Frame& frame, double black_counts, const NoiseModel& noise) {
-    BlockSums sums(frame);
-    sums.add(frame, 0, frame.height, frame.samples.data());
-    return sums.summary(black_counts, noise);
-}
-
 bool is_dark(const FrameSummary& summary) {
     const float limit = 6 * summary.noise + black_drift_counts;
     return std::all_of(summary.blocks.begin(), summary.blocks.end(),

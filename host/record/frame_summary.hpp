@@ -32,8 +32,6 @@ class BlockSums {
     std::array<double, grid * grid> sums_{};
 };
 
-FrameSummary summarize_frame(const Frame& frame, double black_counts, const NoiseModel& noise);
-
 // Whether no block differs from black by more than six standard deviations of its mean and `black_drift_counts`, what
 // the black level may wander between two calibrations.
 bool is_dark(const FrameSummary& summary);

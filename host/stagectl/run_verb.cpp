@@ -110,7 +110,7 @@ void add_run_verb(CLI::App& app, int& exit_code) {
     options->links.add_to(*verb, true);
     options->take.add_to(*verb);
     verb->add_option("--memory-mb", options->memory_mb,
-                     "memory for frames that are not developed yet, all of it taken before the take begins; otherwise "
+                     "memory for frames that are not developed yet; otherwise "
                      "as much as "
                      "developing must hold at once")
         ->check(CLI::Range(1, 1 << 24));

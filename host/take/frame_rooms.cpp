@@ -61,7 +61,6 @@ Result<FrameRooms> make_frame_rooms(const TakeDescription& take, const std::vect
     options.period = std::chrono::nanoseconds(take.sequence.slots.front().period_ticks * 1'000'000'000ull / tick_hz);
     const size_t least = frames_held(take, outputs);
     options.frames_max = least;
-    options.is_touched = true;  // a page that is cleared when a frame comes holds that one up
     if (memory.ram_bytes > 0) {
         uint64_t bytes = 0;  // of a frame of each camera
         for (const CameraConfig& camera : take.stage.cameras) bytes += FrameRoom::bytes_a_frame(camera.frame_bytes());

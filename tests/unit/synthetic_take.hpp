@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "record/identify.hpp"
+#include "summarize_frame.hpp"
 
 namespace ols::test {
 

@@ -11,10 +11,11 @@
 #include <limits>
 
 #include "image/exr.hpp"
-#include "record/frame_summary.hpp"
 #include "stage/calibration.hpp"
+#include "summarize_frame.hpp"
 
 using namespace ols;
+using test::summarize_frame;
 
 namespace {
 

@@ -166,7 +166,6 @@ TEST_F(FrameRooms, a_full_disk_is_named_and_what_it_does_not_take_stays_in_memor
 TEST_F(FrameRooms, memory_that_is_not_there_is_an_error_before_the_take) {
     FrameRoom::Options options = options_of(1 << 20);
     options.frame_bytes = size_t(1) << 40;
-    options.is_touched = true;
     const auto room = FrameRoom::create(options);
     ASSERT_FALSE(room.ok());
     EXPECT_NE(room.error().message.find("--memory-mb"), std::string::npos);
