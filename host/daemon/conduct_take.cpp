@@ -101,7 +101,6 @@ Status Conductor::wait_for_button(StageWatch& watch) {
 }
 
 void Conductor::begin_take(std::shared_ptr<RunningTake> take) {
-    light_played_ = true;
     {
         const std::lock_guard lock(mutex_);
         take->began = Clock::now();
@@ -196,6 +195,7 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
         if (devices_) (void)devices_->make_dark();
         devices_.reset();
         next_look_ = {};
+        has_failed_in_light_ = true;
         return change_state(DaemonState::idle, why);
     }
     nlohmann::json account = take_json(*report, archives);
@@ -246,6 +246,7 @@ void Conductor::calibrate_now(CardOptions card, const Reply& reply) {
         &take->monitor.record());
     tell_dark(*take);
     say_notes(watch->end_take());
+    has_failed_in_light_ = !measured;
     if (!measured) return refuse(stop_.wanted ? fail(measured.error().message + ": " + stop_.why()) : measured.error());
     if (const Status kept = write_calibration(folder, card.camera, measured->calibration, measured->record); !kept)
         return refuse(kept.error());

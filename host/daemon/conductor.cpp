@@ -174,11 +174,12 @@ Status Conductor::hold_devices() {
     return Done{};
 }
 
-// While nothing runs: a device that has gone is a fault, which ends by itself when all are back, unless there was light, or was to come.
+// While nothing runs: a device that has gone is a fault, which ends by itself when all are back, unless it went in light, or light was to
+// come.
 void Conductor::look_at_devices() {
     const Snapshot before = snapshot();
     const bool is_armed = before.state == DaemonState::armed;
-    const bool was_in_light = std::exchange(light_played_, false) || is_armed;
+    const bool was_in_light = std::exchange(has_failed_in_light_, false) || is_armed;
     Status there = hold_devices();
     if (there) there = devices_->look(is_armed);
     if (!there) {

@@ -152,7 +152,7 @@ class Conductor {
     std::optional<StageDevices> devices_;
     std::optional<TakePlan> plan_;  // of what is armed
     Clock::time_point next_look_;
-    bool light_played_ = false;  // since the last look at the devices
+    bool has_failed_in_light_ = false;  // since the last look at the devices: what that finds gone was gone in light
     std::thread thread_;
 
     Followed followed_;  // the main thread's own

@@ -44,6 +44,28 @@ def test_a_device_that_goes_away_is_a_fault_that_says_so(alone, state, how):
     assert daemon.run("record", "--slate", "after", "--json")["targets_missing"] == 0
 
 
+@pytest.mark.parametrize("light, ended", [("record", "take_finished"), ("calibrate", "calibration_finished")])
+def test_a_stage_that_goes_right_after_light_that_ended_well_is_taken_again_when_it_is_back(alone, light, ended):
+    daemon = alone()
+    daemon.stage.end()
+    daemon.until_state("fault")
+    daemon.stage.scene = "card.toml"
+    daemon.stage.start()
+    for _ in range(6):  # the daemon looks at its devices at once: in some of them it finds the board gone
+        daemon.until_state("idle")
+        board = daemon.stage.board_process()
+        with daemon.connect() as client:
+            client.call("subscribe")
+            client.call(light, **({"card": 0.985} if light == "calibrate" else {}))
+            client.until_event(ended)
+            os.kill(board, signal.SIGKILL)
+        daemon.until_state("fault")
+        assert not daemon.call("status")["fault_is_latched"]
+        daemon.stage.end(signal.SIGKILL)
+        daemon.stage.start()
+    daemon.until_state("idle")
+
+
 @pytest.mark.parametrize("state", ["idle", "armed", "recording"])
 def test_sigterm_finishes_what_is_held_and_leaves_the_board_dark(alone, state):
     daemon = alone()
