@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
 # A stage and a daemon that the tests of a file share, as most of them change nothing that lasts.
+import contextlib
+import itertools
+
 import pytest
 
 from stage_daemon import BIN, Daemon, Stage, until
@@ -11,22 +14,19 @@ def pytest_configure():
             raise pytest.UsageError(f"{BIN / program} is missing: run `make host`")
 
 
+@contextlib.contextmanager
 def on_stage(folder, settings="", stage="", options=()):
     """A stage that plays, and its daemon, idle."""
     daemon = Daemon(folder, settings, stage)
-    virtual = Stage(daemon.work, *options).start()
-    daemon.start()
-    daemon.stage = virtual
-    daemon.until_state("idle")
-    return daemon
+    with Stage(daemon.work, *options) as daemon.stage, daemon:
+        daemon.until_state("idle")
+        yield daemon
 
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory):
-    daemon = on_stage(tmp_path_factory.mktemp("stage"))
-    yield daemon
-    daemon.end()
-    daemon.stage.end()
+    with on_stage(tmp_path_factory.mktemp("stage")) as daemon:
+        yield daemon
 
 
 @pytest.fixture
@@ -43,13 +43,6 @@ def daemon(shared):
 @pytest.fixture
 def alone(tmp_path):
     """Makes stages of one's own: alone(settings, stage)."""
-    made = []
-
-    def make(settings="", stage="", options=()):
-        made.append(on_stage(tmp_path / f"stage{len(made)}", settings, stage, options))
-        return made[-1]
-
-    yield make
-    for daemon in made:
-        daemon.end()
-        daemon.stage.end()
+    with contextlib.ExitStack() as made:
+        folders = (tmp_path / f"stage{number}" for number in itertools.count())
+        yield lambda *settings, **more: made.enter_context(on_stage(next(folders), *settings, **more))

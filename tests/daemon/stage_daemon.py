@@ -28,12 +28,18 @@ def until(condition, seconds=60, what="it"):
 
 
 class Stage:
-    """The virtual stage's process: board and camera. Can be ended, and started again at the same place."""
+    """The virtual stage's process: board and camera; with `with`. Can be ended, and started again at the same place."""
 
     def __init__(self, folder, *options, scene="spheres.toml"):
         self.folder, self.options, self.scene = folder, options, scene
         folder.mkdir(parents=True, exist_ok=True)
         self.process = None
+
+    def __enter__(self):
+        return self.start()
+
+    def __exit__(self, *_):
+        self.end()
 
     def start(self, *options):
         for name in ("board.sock", "cam0.ring"):
@@ -203,6 +209,12 @@ def bring_to(daemon, state):
         daemon.run("record", "--seconds", "60", "--no-wait", "--slate", "cut")
         until(lambda: daemon.call("status")["take"]["triggers_fired"] > 400)
     assert daemon.state() == state
+
+
+def targets_written(daemon):
+    """So far, of the take that runs."""
+    take = daemon.call("status")["take"]
+    return take["outputs"][0]["targets_written"] if take else 0
 
 
 def assert_takes_are_whole(daemon, targets_at_least):

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from stage_daemon import BIN, Daemon, assert_takes_are_whole, bring_to, until
+from stage_daemon import BIN, Daemon, assert_takes_are_whole, bring_to, targets_written, until
 
 
 @pytest.mark.parametrize("state", ["idle", "armed", "recording"])
@@ -83,7 +83,7 @@ def test_sigterm_finishes_what_is_held_and_leaves_the_board_dark(alone, state):
 def test_a_daemon_that_is_killed_loses_no_finished_target_and_the_board_goes_dark(alone, state):
     daemon = alone()
     bring_to(daemon, state)
-    written = (daemon.call("status")["take"] or {"outputs": [{"targets_written": 0}]})["outputs"][0]["targets_written"]
+    written = targets_written(daemon)
     daemon.end(signal.SIGKILL)
     time.sleep(1)
     daemon.start()  # the socket that was left behind does not hinder it

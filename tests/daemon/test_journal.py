@@ -30,11 +30,8 @@ def journaled(tmp_path):
     daemon.journal = tmp_path / "journal"
     daemon.journal.mkdir()
     daemon.under = ["unshare", "--mount", sys.executable, HERE / "in_journal.py", daemon.journal]
-    stage = Stage(daemon.work).start()
-    daemon.start()
-    yield daemon
-    daemon.end()
-    stage.end()
+    with Stage(daemon.work), daemon:
+        yield daemon
 
 
 def test_each_event_is_an_entry_with_its_code_name_number_and_priority(journaled):

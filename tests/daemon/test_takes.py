@@ -4,11 +4,10 @@ import json
 import re
 import signal
 import subprocess
-import time
 
 import pytest
 
-from stage_daemon import BIN, Refused, read_lamps, until
+from stage_daemon import BIN, Refused, read_lamps, targets_written, until
 
 
 def verify(archive):
@@ -45,8 +44,7 @@ def test_a_take_of_the_daemon_is_a_take_of_the_command_line(alone, tmp_path):
 
 def test_stop_acts_at_once_and_reports_dark_when_the_board_has_said_so(daemon):
     daemon.run("record", "--seconds", "60", "--no-wait")
-    daemon.until_state("recording")
-    time.sleep(0.5)
+    until(lambda: targets_written(daemon) >= 1)
     stopped = daemon.run("stop", "--json")
     assert stopped["dark"]
     daemon.until_state("idle")
@@ -60,8 +58,7 @@ def test_stop_acts_at_once_and_reports_dark_when_the_board_has_said_so(daemon):
 
 def test_ctrl_c_at_the_client_ends_the_light_and_finishes_the_take(daemon):
     client = daemon.background("record", "--seconds", "60", "--json")
-    daemon.until_state("recording")
-    time.sleep(0.3)
+    until(lambda: targets_written(daemon) >= 1)
     client.send_signal(signal.SIGINT)
     out, _ = client.communicate(timeout=60)
     assert client.returncode == 2 and json.loads(out)["targets_written"] >= 1

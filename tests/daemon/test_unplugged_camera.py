@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 # A GigE Vision camera that goes away in each state, however it goes: the daemon names it, ends dark, keeps what was finished, and records
 # again when it is back. Over the loopback, through Aravis and the kernel's UDP.
+import contextlib
 import sys
 
 import pytest
 
-from stage_daemon import ROOT, Daemon, Refused, Stage, assert_frames_have_their_slots, assert_takes_are_whole, bring_to, until
+from stage_daemon import ROOT, Daemon, Refused, Stage, assert_frames_have_their_slots, assert_takes_are_whole, bring_to, targets_written, until
 
 sys.path.append(str(ROOT / "tests/gige"))
 from gige_camera import GigeCamera  # noqa: E402
@@ -16,14 +17,12 @@ def on_gige(tmp_path):
     """A daemon on a stage of wall pace, which waits for no camera, and the camera."""
     camera = GigeCamera(tmp_path / "work/cam0.ring")
     daemon = Daemon(tmp_path, camera=f"aravis:{camera.address}")
-    stage = Stage(daemon.work, "--pace", "wall").start()
-    camera.start()
-    daemon.start()
-    daemon.until_state("idle")
-    yield daemon, camera
-    daemon.end()
-    camera.unplug()
-    stage.end()
+    with Stage(daemon.work, "--pace", "wall"), contextlib.ExitStack() as plugged:
+        camera.start()
+        plugged.callback(camera.unplug)
+        with daemon:
+            daemon.until_state("idle")
+            yield daemon, camera
 
 
 def bring_into_light(daemon):
@@ -45,7 +44,7 @@ def test_a_camera_that_goes_away_is_a_fault_that_names_it(on_gige, state, how):
     daemon, camera = on_gige
     bring_into_light(daemon) if state == "calibrating" else bring_to(daemon, state)
     if state == "recording":
-        until(lambda: daemon.call("status")["take"]["outputs"][0]["targets_written"] >= 2)
+        until(lambda: targets_written(daemon) >= 2)
     camera.unplug() if how == "unplugged" else camera.stand_still()
     daemon.until_state("fault", seconds=120)
     fault = daemon.call("status")

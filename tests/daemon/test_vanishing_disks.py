@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Disks that go away while a take is recorded: the takes', and the one that frames are spilled to. The disks are file systems of the test's
 # own (vanishing_disk.py), mounted where only the daemon sees them; what is on them is looked at in the folders that they are made of.
+import contextlib
 import json
 import os
 import pathlib
@@ -9,7 +10,7 @@ import sys
 
 import pytest
 
-from stage_daemon import BIN, Daemon, Refused, Stage, assert_frames_have_their_slots, bring_to, until
+from stage_daemon import BIN, Daemon, Refused, Stage, assert_frames_have_their_slots, bring_to, targets_written, until
 
 PROGRAM = pathlib.Path(__file__).resolve().parent / "vanishing_disk.py"
 
@@ -41,32 +42,24 @@ def under(*disks):
 @pytest.fixture
 def on_disks(tmp_path):
     """A stage whose daemon has its takes, and what it spills, on disks that can vanish."""
-    made = []
+    with contextlib.ExitStack() as made:
 
-    def make(spills=False, options=()):
-        takes = VanishingDisk(tmp_path / "disks/takes", tmp_path / "takes")
-        spill = VanishingDisk(tmp_path / "disks/spill", tmp_path / "spill")
-        daemon = Daemon(tmp_path, f'memory_mb = 2\nspill = "{spill.mount}"' if spills else "")
-        daemon.under = under(takes, spill)
-        tried = subprocess.run([*map(str, daemon.under), "/bin/true"], capture_output=True, text=True, timeout=60)
-        if tried.returncode != 0:
-            pytest.skip(f"no file system of one's own can be mounted here: {tried.stderr.strip().splitlines()[-1]}")
-        stage = Stage(daemon.work, *options).start()
-        made.append((daemon, stage, takes, spill))
-        daemon.start()
-        daemon.until_state("idle")
-        return daemon, takes, spill
+        def make(spills=False, options=()):
+            takes = VanishingDisk(tmp_path / "disks/takes", tmp_path / "takes")
+            spill = VanishingDisk(tmp_path / "disks/spill", tmp_path / "spill")
+            daemon = Daemon(tmp_path, f'memory_mb = 2\nspill = "{spill.mount}"' if spills else "")
+            daemon.under = under(takes, spill)
+            tried = subprocess.run([*map(str, daemon.under), "/bin/true"], capture_output=True, text=True, timeout=60)
+            if tried.returncode != 0:
+                pytest.skip(f"no file system of one's own can be mounted here: {tried.stderr.strip().splitlines()[-1]}")
+            made.enter_context(Stage(daemon.work, *options))
+            made.enter_context(daemon)
+            for disk in (takes, spill):
+                made.callback(disk.be)
+            daemon.until_state("idle")
+            return daemon, takes, spill
 
-    yield make
-    for daemon, stage, *disks in made:
-        for disk in disks:
-            disk.be()
-        daemon.end()
-        stage.end()
-
-
-def written(daemon):
-    return daemon.call("status")["take"]["outputs"][0]["targets_written"]
+        yield make
 
 
 def triggers_without_frame(daemon):
@@ -84,7 +77,7 @@ def verify(archive):
 def test_a_takes_disk_that_vanishes_ends_the_take_and_is_named(on_disks, mood):
     daemon, takes, _ = on_disks()
     bring_to(daemon, "recording")
-    until(lambda: written(daemon) >= 3)
+    until(lambda: targets_written(daemon) >= 3)
     takes.be(mood)
     before = len(verify(takes.folder / "cut_001.rfa")["intact"])
     daemon.until_state("fault")
@@ -125,7 +118,7 @@ def test_a_takes_disk_that_has_vanished_before_the_light_is_an_error_and_no_ligh
 def test_a_spill_disk_that_vanishes_is_named_and_costs_what_was_on_it(on_disks):
     daemon, takes, spill = on_disks(True, ("--pace", "wall"))
     daemon.run("record", "--seconds", "600", "--no-wait", "--slate", "cut")
-    until(lambda: written(daemon) >= 3)
+    until(lambda: targets_written(daemon) >= 3)
     takes.be("still")
     until(lambda: daemon.call("status")["take"]["cameras"][0]["frames_spilled"] > 100, 300)
     spill.be("gone")
