@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "device/aravis_frame.hpp"
 #include "device/aravis_link.hpp"
@@ -34,9 +35,28 @@ struct Acquisition {
     bool tells_end = false;   // it says itself whether it is acquiring
 };
 
+// The acquisition that the camera, its reader and the watchdog share. Not std::atomic<std::shared_ptr>: libstdc++'s load() lets go of it
+// by a relaxed store, behind which a processor may read the pointer (bits/shared_ptr_atomic.h of GCC 12).
+class RunningAcquisition {
+  public:
+    std::shared_ptr<Acquisition> get() const {
+        const std::lock_guard lock(mutex_);
+        return acquisition_;
+    }
+    // The one before.
+    std::shared_ptr<Acquisition> replace(std::shared_ptr<Acquisition> next) {
+        const std::lock_guard lock(mutex_);
+        return std::exchange(acquisition_, std::move(next));
+    }
+
+  private:
+    mutable std::mutex mutex_;
+    std::shared_ptr<Acquisition> acquisition_;
+};
+
 // What the watchdog finds, for whoever asks.
 struct Watch {
-    std::atomic<std::shared_ptr<Acquisition>> running;  // of the camera, until it or the watchdog lets go of it
+    RunningAcquisition running;  // of the camera, until it or the watchdog lets go of it
     CameraClock clock;
     std::atomic<uint64_t> life_ns = 0;  // machine time at which the device last gave a sign of life
     std::atomic<bool> is_running = false, tells_end = false, has_ended = false;
@@ -45,7 +65,7 @@ struct Watch {
 void look_after(AravisLink& link, Watch& watch) {
     if (link.is_lost()) {
         // Once its frames are read: Aravis goes on asking a USB3 camera that has gone, without a pause.
-        if (const auto last = watch.running.load(); last && !last->stream->has_waiting()) watch.running.store(nullptr);
+        if (const auto last = watch.running.get(); last && !last->stream->has_waiting()) watch.running.replace(nullptr);
         return;
     }
     if (!watch.is_running) return;
@@ -102,7 +122,7 @@ class AravisCamera : public Camera {
         }
         const uint64_t started_ns = begun->first->started_ns;
         delivery_.start(started_ns);
-        watch_->running = std::move(begun->first);
+        watch_->running.replace(std::move(begun->first));
         const std::lock_guard lock(mutex_);
         chosen_ = std::move(begun->second);
         return started_ns;
@@ -155,7 +175,7 @@ class AravisCamera : public Camera {
     void halt() {
         watch_->is_running = false;
         // The device is told to stop before its stream goes.
-        const std::shared_ptr<Acquisition> ended = watch_->running.exchange(nullptr);
+        const std::shared_ptr<Acquisition> ended = watch_->running.replace(nullptr);
         // Also of a start that nobody waits for any more.
         library_->post([link = link_, watch = watch_] {
             watch->is_running = false;
@@ -198,7 +218,7 @@ class AravisCamera : public Camera {
         return std::pair{std::move(acquisition), std::move(chosen)};
     }
 
-    std::shared_ptr<Acquisition> running() const { return watch_->running; }
+    std::shared_ptr<Acquisition> running() const { return watch_->running.get(); }
 
     std::optional<Frame> read_buffer(Acquisition& acquisition, ArvBuffer* buffer) {
         Frame frame = new_frame();

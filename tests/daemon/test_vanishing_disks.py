@@ -130,7 +130,8 @@ def test_a_spill_disk_that_vanishes_is_named_and_costs_what_was_on_it(on_disks):
     fault = daemon.call("status")
     assert "Input/output error" in fault["fault"] and str(spill.mount) in fault["fault"], fault["fault"]
     end = daemon.events("take_finished")[-1]["data"]
-    assert end["causes"]["disk_was_late"] > 100 and "host_was_late" not in end["causes"], end["causes"]
+    late = {cause: end["causes"].get(cause, 0) for cause in ("disk_was_late", "host_was_late")}  # a busy machine's host is late, too
+    assert late["disk_was_late"] > max(100, late["host_was_late"]), end["causes"]
     report = verify(takes.folder / "cut_001.rfa")
     assert len(report["intact"]) == end["targets_written"] >= 3
     archive = takes.folder / "cut_001.rfa"
