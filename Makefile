@@ -81,7 +81,7 @@ daemon-test-threads: all ## the same, the daemon with ThreadSanitizer
 	@SERVE=$(THREADS)/bin/stagectl TSAN_OPTIONS=suppressions=tests/daemon/threads.supp $(PYTHON) -m pytest -q tests/daemon
 
 soak: all ## an hour and more of takes with random faults by the daemon (TAKES=n, SEED=n)
-	@SOAK_TAKES=$(or $(TAKES),1000) SOAK_SEED=$(or $(SEED),1) $(PYTHON) -m pytest -q tests/daemon/test_service.py -k random_faults
+	@SOAK_TAKES=$(or $(TAKES),2500) SOAK_SEED=$(or $(SEED),1) $(PYTHON) -m pytest -q tests/daemon/test_service.py -k random_faults
 
 hil: all ## the numbered board tests and the capture tests, on the emulated board or a real one (BOARD=usb:SERIAL)
 	@$(SIDE_BY_SIDE) hil-pytest capture-pytest
