@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <mutex>
 
 #include "daemon/metrics.hpp"
 #include "daemon/preview.hpp"
@@ -46,6 +47,7 @@ TakeRequest take_request(JsonObject& params) {
     if (params.has("seconds")) request.seconds = params.number("seconds", 1e-3, seconds_max);
     if (params.has("slate")) request.slate = params.text("slate");
     if (params.has("number")) request.number = int(params.count("number", take_number_max));
+    if (request.number == 0) params.reject("number", "is at least 1");
     if (params.has("notes")) request.notes = params.text("notes");
     if (params.has("fps")) request.fps = params.number("fps", 0, 100'000);
     if (params.has("quality")) request.quality = params.text("quality");
@@ -69,12 +71,16 @@ CardOptions card_options(JsonObject& params) {
     if (params.has("card")) card.reflectance = params.number("card", 0.01, 1);
     if (params.has("number")) card.camera = uint32_t(params.count("number", 1000));
     if (params.has("exposure_us")) card.exposure_us = params.number("exposure_us", 0.1, 400);
-    if (params.has("cycles")) card.cycles = int(std::max<uint64_t>(params.count("cycles", 10'000), 1));
+    if (params.has("cycles")) card.cycles = int(params.count("cycles", 10'000));
+    if (card.cycles == 0) params.reject("cycles", "is at least 1");
     return card;
 }
 
-// Of one take at a time, and the developing of a take that runs goes on beside it: it takes one processor.
+// One at a time: it takes a processor, which a take that runs needs itself.
 Result<json> preview_of(const TakeFolder& takes, const std::string& take, double exposure_ev) {
+    static std::mutex one_at_a_time;
+    const std::unique_lock lock(one_at_a_time, std::try_to_lock);
+    if (!lock) return fail("another preview is being made: try again when it is done");
     const auto target = takes.latest_target(take);
     if (!target) return target.error();
     const auto preview = preview_target(target->archive, target->camera, target->index, exposure_ev);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -27,12 +28,18 @@ Result<DaemonClient> DaemonClient::connect(const std::string& path) {
     const auto address = unix_address(path);
     if (!address) return address.error();
     DaemonClient client(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), path);
+    // A place among those who wait is not waited for without end.
+    const timeval patience{stop_patience.count(), 0};
+    (void)::setsockopt(client.fd_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
     if (client.fd_ < 0 || ::connect(client.fd_, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
         const int error = errno;
-        const char* const hint = error == EACCES
-                                     ? "be a member of the group that may use it ([daemon] socket_group)"
-                                     : "start it with `systemctl start stagectl` or `stagectl serve`, or say where it "
-                                       "listens with --socket";
+        const char* const hint =
+            error == EACCES ? "be a member of the group that may use it ([daemon] socket_group)"
+            : error == EAGAIN
+                ? "it hangs, or too many others wait for it: `systemctl restart stagectl`, and the emergency stop "
+                  "for light that is to end"
+                : "start it with `systemctl start stagectl` or `stagectl serve`, or say where it "
+                  "listens with --socket";
         return fail(fmt::format("no daemon answers at '{}' ({}): {}", path, std::strerror(error), hint));
     }
     return client;
@@ -96,9 +103,16 @@ std::optional<Result<nlohmann::json>> DaemonClient::answer(std::chrono::millisec
 }
 
 Result<nlohmann::json> DaemonClient::call(const std::string& method, const nlohmann::json& params) {
+    const auto begun = std::chrono::steady_clock::now();
     if (const Status sent = send(method, params); !sent) return sent.error();
-    for (;;)
-        if (auto answered = answer(std::chrono::milliseconds(1000))) return std::move(*answered);
+    for (;;) {
+        if (auto answered = answer(std::chrono::milliseconds(500))) return std::move(*answered);
+        if (method == "stop" && std::chrono::steady_clock::now() - begun > stop_patience)
+            return fail(fmt::format(
+                "the daemon at '{}' has not answered for {} s: use the emergency stop; `systemctl kill -s KILL "
+                "stagectl` ends a daemon that hangs, and the board goes dark without it",
+                path_, stop_patience.count()));
+    }
 }
 
 Result<std::optional<nlohmann::json>> DaemonClient::next_event(std::chrono::milliseconds timeout) {

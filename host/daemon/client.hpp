@@ -21,7 +21,9 @@ class DaemonClient {
     // The error says to start the daemon.
     static Result<DaemonClient> connect(const std::string& socket_path);
 
-    // The result of a call; waits for it as long as the daemon lives. The error is the daemon's, or that it has gone.
+    // The result of a call; waits for it as long as the daemon lives, for the end of light so long only. The error is the daemon's, that
+    // it has gone, or that it does not answer.
+    static constexpr std::chrono::seconds stop_patience{15};
     Result<nlohmann::json> call(const std::string& method, const nlohmann::json& params = nlohmann::json::object());
 
     // The same in two halves: for one who has something to do meanwhile. answer() waits so long.

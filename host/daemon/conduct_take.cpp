@@ -2,6 +2,9 @@
 // The conductor's takes: from armed by way of light and dark to an archive that is finished.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+
 #include "daemon/conductor.hpp"
 #include "image/bytes_text.hpp"
 #include "take/stage_watch.hpp"
@@ -55,6 +58,7 @@ Status Conductor::arm_now(const TakeRequest& request) {
             "to {}; make room, or record a shorter take",
             stage_.daemon.takes, bytes_text(double(disk.bytes_free)), bytes_text(double(disk.bytes_reserve)),
             disk.seconds_that_fit, disk.seconds, bytes_text(double(disk.bytes_needed)));
+        if (devices_) (void)devices_->make_dark();
         events_.add(EventKind::disk_short, why, plan->to_json());
         change_state(DaemonState::idle);
         return fail(why);
@@ -94,7 +98,12 @@ Status Conductor::wait_for_button(StageWatch& watch) {
         now_.waits_for = "the arm button";
     }
     events_.add(EventKind::waits_for_button, "the arm button begins the take");
-    const Status pressed = watch.wait_for_arm();
+    const auto look = [this, next = Clock::now()]() mutable -> Status {
+        if (Clock::now() < next) return Done{};
+        next = Clock::now() + look_pause;
+        return devices_->look(true);
+    };
+    const Status pressed = watch.wait_for_arm(look);
     const std::lock_guard lock(mutex_);
     now_.waits_for.clear();
     return pressed;
@@ -140,15 +149,18 @@ void Conductor::record_now(const TakeRequest& request, const Reply& reply) {
     if (!watch) return back_to_idle(watch.error());
     if (watch->has_arm_button())
         reply_once(reply, Outcome(nlohmann::json{{"take", name->text()}, {"waits_for", "the arm button"}}));
-    if (const Status pressed = wait_for_button(*watch); !pressed) return back_to_idle(pressed.error());
+    if (const Status pressed = wait_for_button(*watch); !pressed) {
+        next_look_ = {}, has_failed_in_light_ = true;  // light was to come: what is gone stays a fault
+        return back_to_idle(pressed.error());
+    }
     if (const Status ready = watch->begin_take(); !ready) return back_to_idle(ready.error());
 
     auto take = std::make_shared<RunningTake>();
     take->name = name->text(), take->archive = plan.choices.output, take->activity = "take";
     take->seconds_planned = plan.forecast.seconds;
     for (size_t c = 0; c < stage_.cameras.size(); ++c)
-        take->target_bytes += target_bytes_max(plan.sequence, stage_, c, plan.targets, plan.choices.single_float);
-    take->target_bytes *= archives->size();
+        take->target_bytes = std::max(
+            take->target_bytes, target_bytes_max(plan.sequence, stage_, c, plan.targets, plan.choices.single_float));
     begin_take(take);
     nlohmann::json watched = nlohmann::json::object();
     const auto report = run_planned(plan, *archives, *watch, reply, watched);
@@ -192,13 +204,17 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
         if (stop_.wanted && why.find(stop_.why()) == std::string::npos) why += ": " + stop_.why();
         events_.add(EventKind::take_failed, why, {{"take", take->name}});
         // As they are is not known: they are opened anew, and looked at. A board that were still armed would take that for a lost host.
-        if (devices_) (void)devices_->make_dark();
+        Status there = Done{};
+        if (devices_) (void)devices_->make_dark(), there = devices_->look(false);
         devices_.reset();
         next_look_ = {};
         has_failed_in_light_ = true;
+        if (!there) return enter_fault(there.error().message, true);
         return change_state(DaemonState::idle, why);
     }
+    const std::string trouble = trouble_of(*report, stop_);
     nlohmann::json account = take_json(*report, archives);
+    account["fault"] = trouble;
     account.update(watched);
     account["take"] = take->name;
     account["slots_missing_total"] = report->record.missing().total();
@@ -212,9 +228,12 @@ void Conductor::end_record(const Result<TakeReport>& report, const std::vector<P
                                    output.targets_written, output.targets_missing, missing,
                                    report->record.slots_total * report->record.cameras.size());
     if (missing > 0) text += " (" + report->record.missing().to_words() + ")";
+    for (size_t n = 1; n < archives.size(); ++n)
+        text +=
+            fmt::format("; {}: {} targets written, {} missing", std::filesystem::path(archives[n].path).stem().string(),
+                        report->outputs[n].targets_written, report->outputs[n].targets_missing);
     if (stop_.wanted) text += "; " + stop_.why();
     events_.add(EventKind::take_finished, text, account);
-    const std::string trouble = trouble_of(*report, stop_);
     if (!trouble.empty()) return enter_fault(trouble, true);
     change_state(DaemonState::idle);
 }

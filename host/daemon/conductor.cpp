@@ -12,8 +12,6 @@ namespace ols {
 
 namespace {
 
-// Between two looks at devices that nobody uses. The board's heartbeat, without which an armed board goes dark, is some seconds.
-constexpr std::chrono::milliseconds look_pause(500);
 // For what has begun to be over, from a stop on: the board has Patience::stop_ms for it, and then it is known not to answer.
 constexpr std::chrono::milliseconds dark_patience(Patience::stop_ms + 2000);
 
@@ -37,12 +35,17 @@ Status check_lasting(const DaemonSetup& before, const DaemonSetup& now) {
 Conductor::Conductor(std::string config_path, StageConfig stage, EventLog& events)
     : config_path_(std::move(config_path)), events_(events), stage_(std::move(stage)) {
     now_.sequence = stage_.daemon.sequence;
+    now_.totals.know(stage_);
     look_at_devices();  // nobody is told that all is well before it was looked at
     thread_ = std::thread([this] { work(); });
 }
 
 Conductor::~Conductor() {
     shut_down([] {});
+}
+
+void TakeTotals::know(const StageConfig& stage) {
+    for (uint32_t index = 0; index < stage.cameras.size(); ++index) cameras[index];
 }
 
 void TakeTotals::add(const TakeProgress& progress) {
@@ -82,7 +85,7 @@ void Conductor::work() {
             continue;
         }
         const Status done = guarded("the daemon gave up what it did", [&] { return job(), Status(Done{}); });
-        if (!done) enter_fault(done.error().message, true);
+        if (!done) give_up(done.error().message);
         job = {};
         const std::lock_guard lock(mutex_);
         job_ = {};
@@ -91,6 +94,18 @@ void Conductor::work() {
     }
     if (devices_) (void)devices_->make_dark();
     devices_.reset();
+}
+
+// What was under way ended with an exception: where it was is not known.
+void Conductor::give_up(const std::string& why) {
+    if (devices_) (void)devices_->make_dark();
+    devices_.reset();
+    next_look_ = {}, has_failed_in_light_ = true;
+    if (const auto take = snapshot().take) {
+        const bool is_take = take->activity == "take";
+        events_.add(is_take ? EventKind::take_failed : EventKind::calibration_failed, why, {{"take", take->name}});
+    }
+    enter_fault(why, true);
 }
 
 std::future<Conductor::Outcome> Conductor::begin_job(const std::string& what, std::function<void(const Reply&)> job) {
@@ -165,12 +180,23 @@ Status Conductor::hold_devices() {
     auto opened = StageDevices::open(stage_, stop_);
     if (!opened) return opened.error();
     devices_ = std::move(*opened);
+    if (const Status dark = darken_found(); !dark) return devices_.reset(), dark;
     const std::string account = devices_->account();
     {
         const std::lock_guard lock(mutex_);
         now_.devices = account;
     }
     events_.add(EventKind::devices_ready, account);
+    return Done{};
+}
+
+// A board that is opened may play what a program left to it that was killed: its heartbeat is any word, ours, too.
+Status Conductor::darken_found() {
+    const auto found = devices_->board().status();
+    if (!found.ok()) return found.error();
+    if (const Status dark = devices_->make_dark(); !dark) return dark;
+    if (found->state == OLS_STATE_PLAYING || found->state == OLS_STATE_WAITING)
+        events_.add(EventKind::dark, "the board was playing when it was opened, and says now that it is dark");
     return Done{};
 }
 
@@ -214,14 +240,17 @@ Conductor::Outcome Conductor::swap(const std::string& sequence_name) {
     return run("swap", "a swap of sequences", [this, sequence_name](const Reply& reply) {
         TakeRequest request = plan_ ? plan_->request : TakeRequest{};
         if (const auto fits = plan_take(request, sequence_name, stage_); !fits) return reply->set_value(fits.error());
-        {
+        const std::string before = snapshot().sequence;
+        const auto set_sequence = [&](const std::string& name) {
             const std::lock_guard lock(mutex_);
-            now_.sequence = sequence_name;
-        }
+            now_.sequence = name;
+        };
+        set_sequence(sequence_name);
+        if (plan_)
+            if (const Status armed = arm_now(request); !armed)
+                return set_sequence(before), reply->set_value(armed.error());
         events_.add(EventKind::sequence_swapped, "takes are recorded with sequence " + sequence_name,
                     {{"sequence", sequence_name}});
-        if (plan_)
-            if (const Status armed = arm_now(request); !armed) return reply->set_value(armed.error());
         reply->set_value(nlohmann::json{{"sequence", sequence_name}, {"armed", plan_.has_value()}});
     });
 }
@@ -261,6 +290,7 @@ Conductor::Outcome Conductor::reload() {
         {
             const std::lock_guard lock(mutex_);
             stage_ = *read;
+            now_.totals.know(stage_);
             now_.sequence = stage_.daemon.sequence;
             now_.devices.clear();
         }
@@ -275,11 +305,12 @@ Conductor::Outcome Conductor::reload() {
 Conductor::Outcome Conductor::stop(const std::string& by) {
     const auto asked = Clock::now();
     std::unique_lock lock(mutex_);
-    stop_.ask("stopped by " + by);  // before anybody is told of it
-    events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
     const auto has_dark_take = [&] {
         return now_.take && now_.take->monitor.progress().record.board.dark_confirmed_ns != 0;
     };
+    // A take that is dark has nothing to stop: what it holds is finished.
+    if (!has_dark_take()) stop_.ask("stopped by " + by);  // before anybody is told of it
+    events_.add(EventKind::stop_asked, "stop asked for by " + by, {{"by", by}});
     while (job_ && !has_dark_take() && Clock::now() - asked < dark_patience) {
         stop_.ask("stopped by " + by);
         changed_.wait_for(lock, std::chrono::milliseconds(2));

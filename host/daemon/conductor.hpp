@@ -30,7 +30,7 @@ namespace ols {
 struct RunningTake {
     std::string name, archive, activity;  // "take" or "calibration"
     double seconds_planned = 0;
-    uint64_t target_bytes = 0;  // of one target's file at most, summed over the cameras
+    uint64_t target_bytes = 0;  // of one target's file at most
     std::chrono::steady_clock::time_point began;
     TakeMonitor monitor;
     mutable std::atomic<bool> dark_is_told = false;
@@ -46,6 +46,7 @@ struct TakeTotals {
     uint64_t triggers = 0, targets_written = 0, targets_missing = 0;
 
     void add(const TakeProgress& progress);
+    void know(const StageConfig& stage);  // its cameras, of which nothing came yet
 };
 
 // What the daemon is, at one moment.
@@ -96,6 +97,8 @@ class Conductor {
 
   private:
     using Clock = std::chrono::steady_clock;
+    // Between two looks at devices that nobody uses. The board's heartbeat, without which an armed board goes dark, is some seconds.
+    static constexpr std::chrono::milliseconds look_pause{500};
     using Outcome = Result<nlohmann::json>;
     using Reply = std::shared_ptr<std::promise<Outcome>>;
 
@@ -108,6 +111,8 @@ class Conductor {
     void work();
     void look_at_devices();
     Status hold_devices();
+    Status darken_found();
+    void give_up(const std::string& why);
 
     Status arm_now(const TakeRequest& request);
     void record_now(const TakeRequest& request, const Reply& reply);

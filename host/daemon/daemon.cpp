@@ -90,11 +90,14 @@ void run_until_told(Conductor& conductor, EventLog& events, Signals& signals, Sh
     for (;;) {
         const int signal = signals.wait(look_ms);
         if (signal == SIGTERM || signal == SIGINT) return;
-        reload_waits |= signal == SIGHUP;
+        if (signal == SIGHUP && !std::exchange(reload_waits, true) &&
+            !find_method("reload")->is_allowed(conductor.snapshot().state))
+            events.add(EventKind::note, "the configuration is read anew when nothing runs and nothing is armed");
         const Snapshot now = conductor.snapshot();
         if (reload_waits && find_method("reload")->is_allowed(now.state) && !now.is_busy) {
-            reload_waits = false;
-            (void)conductor.reload();  // what is wrong with it is an event
+            const auto known_wrong = events.counts()[EventKind::configuration_wrong];
+            // What is wrong with it is an event; without one something else came between.
+            reload_waits = !conductor.reload() && events.counts()[EventKind::configuration_wrong] == known_wrong;
         }
         const std::string stuck = conductor.follow(stuck_after);
         if (!stuck.empty() && !is_stuck)

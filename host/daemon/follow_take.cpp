@@ -61,12 +61,12 @@ void Conductor::watch_disk(const TakeProgress& progress) {
     const auto end_by_failure = [this](const std::string& why) {
         end_take(EventKind::disk_failed, "the take ends here, as its disk fails: " + why);
     };
-    uint64_t waiting = 0;
+    const StageConfig stage = this->stage();
+    uint64_t waiting = 0;  // targets, of all cameras and outputs
     for (const OutputProgress& output : progress.outputs) {
         if (!output.write_error.empty()) return end_by_failure(output.write_error);
-        waiting += output.targets_waiting + 2;
+        waiting += output.targets_waiting + 2 * stage.cameras.size();
     }
-    const StageConfig stage = this->stage();
     const auto disk = room_of(stage.daemon.takes);
     if (!disk) return end_by_failure(disk.error().message);
     const uint64_t reserve = uint64_t(stage.daemon.reserve_mb) * 1'000'000;

@@ -9,12 +9,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 
 #include "daemon/call_rate.hpp"
 #include "daemon/subscriber.hpp"
 #include "device/unix_listener.hpp"
+#include "exceptions.hpp"
 #include "image/json_object.hpp"
 
 namespace ols {
@@ -92,7 +95,9 @@ struct LocalServer::Client {
     std::unique_ptr<Subscriber> subscriber;
     uint64_t known_number = 0;  // of the event that the present state, as it was sent, holds last
     bool is_slow = false;
-    std::atomic<bool> has_ended = false;
+    // By the steady clock, while it has nothing asked and is told nothing.
+    std::atomic<int64_t> silent_since_ms = INT64_MAX;
+    std::atomic<bool> is_dismissed = false, has_ended = false;
     std::thread thread;
 };
 
@@ -121,24 +126,41 @@ void LocalServer::drop_ended() {
     std::erase_if(clients_, [](const auto& client) { return client->has_ended.load(); });
 }
 
+// Of a full house the one that has been silent longest leaves: who comes may want to put the light out. Subscribers stay.
+void LocalServer::dismiss_one() {
+    const auto longest =
+        std::ranges::min_element(clients_, {}, [](const auto& client) { return client->silent_since_ms.load(); });
+    if ((*longest)->silent_since_ms != INT64_MAX) (*longest)->is_dismissed = true;
+}
+
 void LocalServer::accept() {
     while (!end_) {
         // Beyond that many the others wait in the kernel's queue, which has its own bound.
-        const bool is_full = clients_.size() >= clients_max;
-        pollfd ready{is_full ? -1 : listener_, POLLIN, 0};
-        (void)::poll(&ready, 1, look_ms);
+        pollfd ready{listener_, POLLIN, 0};
+        const bool somebody_comes = ::poll(&ready, 1, look_ms) > 0;
         drop_ended();
-        if (is_full) continue;
+        if (clients_.size() >= clients_max) {
+            if (somebody_comes) {
+                dismiss_one();
+                (void)::poll(nullptr, 0, look_ms);
+            }
+            continue;
+        }
         const int fd = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
         if (fd < 0) {
             if (errno != EAGAIN) (void)::poll(nullptr, 0, look_ms);  // no descriptor is left: not at once again
             continue;
         }
         Client& client = *clients_.emplace_back(std::make_unique<Client>(fd));
-        client.thread = std::thread([this, &client] {
+        const auto serve_it = [this, &client] {
             serve(client);
             client.has_ended = true;
-        });
+        };
+        const Status begun =
+            guarded("no thread for a client", [&] { return client.thread = std::thread(serve_it), Status(Done{}); });
+        if (begun) continue;
+        events_.add(EventKind::client_refused, begun.error().message);
+        clients_.pop_back();
     }
 }
 
@@ -152,15 +174,23 @@ void LocalServer::serve(Client& client) {
         client.known_number = state["event_number"];
         return {state};
     };
-    for (bool goes_on = true; goes_on && !end_;) {
+    const auto fall_silent = [&] {
+        const auto now = std::chrono::steady_clock::now().time_since_epoch();
+        client.silent_since_ms =
+            client.subscriber ? INT64_MAX : std::chrono::duration_cast<std::chrono::milliseconds>(now).count();
+    };
+    fall_silent();
+    for (bool goes_on = true; goes_on && !end_ && !client.is_dismissed;) {
         pollfd ready{client.fd, POLLIN, 0};
         if (!client.subscriber) (void)::poll(&ready, 1, look_ms);
         goes_on = client.receive();
         while (const auto line = client.line()) {
             if (line->empty()) continue;
+            client.silent_since_ms = INT64_MAX;
             std::this_thread::sleep_for(rate.take());
             const auto answer = answer_rpc(*line, call);
             if (answer && !client.send(*answer)) goes_on = false;
+            fall_silent();
             if (!goes_on || end_) break;
         }
         if (client.input.size() > request_bytes_max) {
@@ -179,6 +209,9 @@ void LocalServer::serve(Client& client) {
     const bool was_slow = client.is_slow;
     client.subscriber.reset();
     (void)::shutdown(client.fd, SHUT_RDWR);
+    if (client.is_dismissed)
+        events_.add(EventKind::client_dropped,
+                    client.name + " was silent while another waited for its place, and was let go of");
     if (was_slow) events_.add(EventKind::client_dropped, client.name + " did not read its events, and was let go of");
 }
 

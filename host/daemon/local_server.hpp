@@ -29,6 +29,7 @@ class LocalServer {
     struct Client;
     LocalServer(std::string path, int listener, Api& api, EventLog& events);
     void accept();
+    void dismiss_one();
     void drop_ended();
     void serve(Client& client);
 

@@ -49,8 +49,8 @@ void add_takes(Page& page, const TakeTotals& totals) {
     page.family("stagectl_camera_slots_missing_total", "counter", "Slots without a frame, by cause.");
     for (const auto& [camera, one] : totals.cameras)
         for (size_t cause = 1; cause < cause_count; ++cause)
-            if (const uint64_t count = one.missing.of(Cause(cause)); count > 0)
-                page.value(count, fmt::format("camera=\"{}\",cause=\"{}\"", camera, cause_name(Cause(cause))));
+            page.value(one.missing.of(Cause(cause)),
+                       fmt::format("camera=\"{}\",cause=\"{}\"", camera, cause_name(Cause(cause))));
     page.family("stagectl_triggers_fired_total", "counter", "Triggers that the board fired.");
     page.value(totals.triggers);
     page.family("stagectl_targets_written_total", "counter", "Targets in archives.");
@@ -104,8 +104,10 @@ std::string metrics_text(const Snapshot& now, const DaemonSetup& setup, const Ev
         page.value(uint64_t(now.state == DaemonState(state)),
                    fmt::format("state=\"{}\"", state_name(DaemonState(state))));
     page.family("stagectl_events_total", "counter", "Events by their kind.");
-    for (const auto& [kind, count] : events.counts())
-        page.value(count, fmt::format("event=\"{}\"", facts_of(kind).name));
+    auto counts = events.counts();
+    for (const EventKindFacts& kind :
+         event_kinds())  // also those that have not come: a rate needs the nought before the first
+        page.value(uint64_t(counts[kind.kind]), fmt::format("event=\"{}\"", kind.name));
     TakeTotals totals = now.totals;
     if (now.take) totals.add(now.take->monitor.progress());
     add_takes(page, totals);

@@ -39,11 +39,14 @@ Status StageDevices::look(bool armed) {
     if (status->state == OLS_STATE_FAULT)
         return fail("the board has a latched fault, " + fault_text(*status) +
                     "; when the cause is gone, `stagectl status --clear-fault`");
+    if (status->state == OLS_STATE_PLAYING || status->state == OLS_STATE_WAITING)
+        return fail(fmt::format("{} is {}, and no take runs: another program uses it", board_->name(),
+                                ols::state_name(status->state)));
     if (armed && status->state != OLS_STATE_ARMED)
         return fail(fmt::format("{} was armed and is {}: another program has used it", board_->name(),
                                 ols::state_name(status->state)));
     for (const auto& camera : cameras_)
-        if (const CameraState state = camera->state(); state.kind != CameraState::live) return fail(state.why);
+        if (const CameraState state = camera->look(); state.kind != CameraState::live) return fail(state.why);
     return Done{};
 }
 

@@ -23,7 +23,7 @@ class StageDevices {
     // The board alone.
     static Result<Board> open_board(const StageConfig& stage, const StopRequest& stop);
 
-    // Whether all are still there and the board is as it was left: `armed` or not, without a fault. The error says what is not.
+    // Whether all are still there and the board is as it was left: dark, `armed` or not, without a fault. The error says what is not.
     Status look(bool armed);
 
     // Dark, by the board's own word: its state after a stop is one in which nothing may be lit. The error says what it answered.

@@ -35,7 +35,8 @@ std::optional<int> number_in(const std::string& name, const std::string& slate) 
     int number = 0;
     const char* const end = name.data() + name.size();
     const auto [stop, error] = std::from_chars(name.data() + start.size(), end, number);
-    return error == std::errc() && stop == end && number > 0 ? std::optional(number) : std::nullopt;
+    const bool is_whole = stop == end || *stop == '-';  // the same take in another quality has that behind a dash
+    return error == std::errc() && is_whole && number > 0 ? std::optional(number) : std::nullopt;
 }
 
 uint64_t bytes_in(const std::string& folder) {

@@ -6,7 +6,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 
 namespace ols {
@@ -33,10 +35,13 @@ Status check_folder(const DaemonSetup& setup, const char* key, const fs::path& f
     else  // it would be made in the last folder of its path that is there
         while (there.has_relative_path() && !fs::exists(there, error)) there = there.parent_path();
     if (fs::is_directory(there, error) && ::access(there.c_str(), W_OK | X_OK) == 0) return Done{};
-    return fail(
-        fmt::format("{} is '{}', which is no folder that this user may write to: make it, and give it to the "
-                    "daemon's user",
-                    setup.places.at(key), folder.string()));
+    const int why = error ? error.value() : errno;
+    return fail(fmt::format("{} is '{}', which is no folder that this user may write to ({}): {}", setup.places.at(key),
+                            folder.string(), std::strerror(why),
+                            why == EROFS
+                                ? "if its disk is not read-only, the unit keeps it from the daemon: `systemctl edit "
+                                  "stagectl`, [Service], ReadWritePaths="
+                                : "make it, and give it to the daemon's user"));
 }
 
 TakeChoices choices_of(const TakeRequest& request, const DaemonSetup& setup) {

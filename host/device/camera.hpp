@@ -84,6 +84,8 @@ class Camera {
     // Frames that wait in its buffers to be read, at most.
     virtual size_t buffers() const { return buffers_max; }
     virtual CameraState state() const = 0;
+    // The same of a device that is asked first, where it tells nothing by itself while nobody reads.
+    virtual CameraState look() { return state(); }
 
     // Frames that are read from now on have their samples in what is lent, where the driver makes them as they are read (new_frame());
     // null: in memory of their own. Not during read().

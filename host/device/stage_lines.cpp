@@ -163,12 +163,17 @@ Status StageLines::set_tally(bool lit) {
     return set;
 }
 
-Status StageLines::wait_for_arm(const std::atomic<bool>& stop) {
+Status StageLines::wait_for_arm(const std::atomic<bool>& stop, const std::function<Status()>& meanwhile) {
     std::unique_lock lock(mutex_);
     const uint64_t presses_before = presses_;
     while (trouble_.empty() && presses_ == presses_before) {
         if (stop) return fail("stopped before the arm button was pressed");
         changed_.wait_for(lock, std::chrono::milliseconds(look_ms));
+        if (!meanwhile) continue;
+        lock.unlock();
+        const Status goes_on = meanwhile();
+        lock.lock();
+        if (!goes_on.ok()) return goes_on;
     }
     if (!trouble_.empty()) return fail(trouble_);
     return Done{};

@@ -148,6 +148,11 @@ class V4l2Camera : public Camera {
         return state_;
     }
 
+    CameraState look() override {
+        if (state().kind != CameraState::gone) (void)answers();
+        return state();
+    }
+
   private:
     using Taken = std::optional<Frame>;
 
@@ -249,11 +254,12 @@ class V4l2Camera : public Camera {
         return state().why;
     }
     bool answers() {
+        const uint64_t stops = stops_;
         const auto error = ask([device = device_] {
             v4l2_capability is{};
             return device->ioctl(VIDIOC_QUERYCAP, &is);
         });
-        if (!error && is_stop_asked_) return true;
+        if (!error && stops_ != stops) return true;
         if (!error) return unanswered("VIDIOC_QUERYCAP"), false;
         if (*error == 0) return true;
         const std::lock_guard lock(mutex_);

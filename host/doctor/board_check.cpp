@@ -79,7 +79,8 @@ Findings check_board(const CheckUp& up) {
         link.verdict = CheckVerdict::fail;
         link.found = board.error().message;
         link.commands = {
-            fmt::format("stagectl status --board {} --wait 30    # and plug it in, or off and on", up.board_link)};
+            fmt::format("stagectl status --board {} --wait 30    # and plug it in, or off and on", up.board_link),
+            "sudo systemctl stop stagectl    # if the daemon has it"};
         findings = {link};
         for (Finding& finding : skip_rest("the board does not answer")) findings.push_back(std::move(finding));
         return findings;

@@ -39,9 +39,14 @@ Finding check_room(const CheckUp& up, const Use& use) {
     if (use.folder.empty())
         return skipped(Check::disk_space, fmt::format("no folder: give {} FOLDER", use.option), use.what);
     Finding finding = finding_of(use, Check::disk_space);
-    const double needed = use.write_bytes_per_s * up.needs.take_s;
+    double needed = use.write_bytes_per_s * up.needs.take_s;
     finding.needed = fmt::format("{}: {} of a take of {:g} s, {}/s without compression", bytes_text(needed), use.what,
                                  up.needs.take_s, bytes_text(use.write_bytes_per_s));
+    if (use.folder == up.stage.daemon.takes) {
+        const double reserve = up.stage.daemon.reserve_mb * 1e6;
+        needed += reserve;
+        finding.needed += fmt::format(", and {} that the daemon keeps ([daemon] reserve_mb)", bytes_text(reserve));
+    }
     const auto room = room_of(use.folder);
     if (!room.ok()) {
         finding.verdict = CheckVerdict::fail;

@@ -21,6 +21,7 @@ struct RoomUse {
     uint64_t frames_in_memory = 0, bytes_in_memory = 0;
     uint64_t frames_on_disk = 0, bytes_on_disk = 0;  // spilled, and not developed yet
     uint64_t frames_spilled = 0;                     // so far
+    bool is_locked = false;                          // its memory cannot be swapped out
     bool disk_has_failed = false;                    // SpillFile::problem() says how
     uint64_t frames_elsewhere = 0;                   // so far: those that no buffer was for, in memory of their own
 };

@@ -138,7 +138,8 @@ void add_doctor_verb(CLI::App& app, int& exit_code) {
         "Example: stagectl doctor --stage stage.toml --sequence examples/sequence_s159.toml --takes /srv/takes\n"
         "Changes nothing on the machine; cameras are opened and set up, disks are measured for some seconds with a "
         "file "
-        "that is gone afterwards. Not while a take is recorded.\n"
+        "that is gone afterwards. Not while a take is recorded. Rights are judged for who runs it: for the daemon\n"
+        "`sudo -u stagectl stagectl doctor --stage /etc/stagectl/stage.toml`, while that does not run.\n"
         "Exit codes: 0 all is well; 2 warnings; 1 failures, or an error, named. What each check means: "
         "docs/checking_the_machine.md");
     options->links.add_to(*verb, true);

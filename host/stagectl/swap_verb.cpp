@@ -74,7 +74,8 @@ void print_result(const Options& options, const Sequence& sequence, const ols_sw
 
 // For the takes to come of the daemon's stage.
 Result<int> swap_by_daemon(const Options& options) {
-    if (options.sequence.path.empty() || options.cycles >= 0 || options.sequence.exposure_us > 0)
+    if (options.sequence.path.empty() || !options.sequence.basis.empty() || options.cycles >= 0 ||
+        options.sequence.exposure_us > 0 || options.no_wait)
         return fail(
             "the daemon takes the name of a sequence, in its folder of sequences, or of a basis, and nothing else; a "
             "board that "

@@ -14,11 +14,17 @@ namespace ols {
 
 namespace {
 
+// The first archive's account is the take's; the others' stand beside it.
 int exit_code_of(const nlohmann::json& take) {
-    if (!take.value("write_error", "").empty() || !take.value("/memory/problem"_json_pointer, "").empty()) return 1;
-    const uint64_t missing = take.value("targets_missing", uint64_t(0)) + take.value("slots_left_out", uint64_t(0)) +
-                             take.value("slots_missing_total", uint64_t(0));
-    return missing > 0 ? 2 : 0;
+    auto archives = take.value("also", nlohmann::json::array());
+    archives.push_back(take);
+    uint64_t missing = take.value("slots_missing_total", uint64_t(0));
+    bool is_written = take.value("/memory/problem"_json_pointer, "").empty();
+    for (const nlohmann::json& archive : archives) {
+        missing += archive.value("targets_missing", uint64_t(0)) + archive.value("slots_left_out", uint64_t(0));
+        is_written = is_written && archive.value("write_error", "").empty();
+    }
+    return !is_written ? 1 : missing > 0 ? 2 : 0;
 }
 
 }  // namespace
@@ -47,6 +53,8 @@ std::optional<Result<int>> TakeFollower::take(const nlohmann::json& event) {
         print_json(event["data"]);
     else
         fmt::print("{}\n", event["text"].get<std::string>());
+    if (const std::string fault = event["data"].value("fault", ""); !fault.empty())
+        say({"the stage is in state fault: " + fault + ": `stagectl status --clear-fault` when the cause is gone"});
     return Result<int>(kind == "take_finished" ? exit_code_of(event["data"]) : 0);
 }
 

@@ -160,7 +160,7 @@ Result<CardCalibration> calibrate_with_card(Board& board, Camera& camera, const 
         record_take(board, {{camera, options.camera, std::nullopt, sink}}, sequence, stage, stop, monitor);
     if (!report.ok()) return report.error();
     const CameraReport& account = report->cameras[0];
-    if (account.missing.of(Cause::camera_gone) > 0)
+    if (!report->board_end.empty() || account.missing.of(Cause::camera_gone) > 0)
         return fail("the calibration was cut short: " +
                     (account.end.empty() ? report->board_end.text : account.end.text));
     if (card.frames() == 0 || dark.frames() == 0)

@@ -38,7 +38,11 @@ size_t frames_brought_back(const TakeDescription& take, const std::vector<TakeOu
 
 MemoryReport FrameRooms::report() const {
     MemoryReport report;
-    for (const auto& room : of_camera) report.frames_spilled += room->use().frames_spilled;
+    report.is_locked = true;
+    for (const auto& room : of_camera) {
+        report.frames_spilled += room->use().frames_spilled;
+        report.is_locked = report.is_locked && room->use().is_locked;
+    }
     if (spill) report.problem = spill->problem();
     return report;
 }

@@ -23,8 +23,8 @@ Result<StageWatch> StageWatch::open(const StageConfig& stage, StopRequest& stop)
     return watch;
 }
 
-Status StageWatch::wait_for_arm() {
-    return lines_->wait_for_arm(stop_->wanted);
+Status StageWatch::wait_for_arm(const std::function<Status()>& meanwhile) {
+    return lines_->wait_for_arm(stop_->wanted, meanwhile);
 }
 
 // The lines last: their tally says that light is about to come.

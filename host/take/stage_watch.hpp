@@ -2,6 +2,7 @@
 // What watches a stage while it plays: its GPIO lines and its lamp nodes, as the stage configures them.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -19,7 +20,9 @@ class StageWatch {
     static Result<StageWatch> open(const StageConfig& stage, StopRequest& stop);
 
     bool has_arm_button() const { return has_arm_; }
-    Status wait_for_arm();  // until the button is pressed, or a stop is asked for
+    // Until the button is pressed, or a stop is asked for. `meanwhile` is called some fifty times a second, and its error ends the
+    // wait: an armed board goes dark with a fault when it hears nothing for its heartbeat.
+    Status wait_for_arm(const std::function<Status()>& meanwhile = nullptr);
 
     // From here on trouble asks for a stop with its reason, and the tally is lit. Errors say what stands against it.
     Status begin_take();

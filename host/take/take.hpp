@@ -106,6 +106,8 @@ struct OutputReport {
 // What became of the room for frames.
 struct MemoryReport {
     uint64_t frames_spilled = 0;
+    bool is_locked =
+        false;  // frames that waited in memory could not be swapped out (mlock(2): LimitMEMLOCK, `ulimit -l`)
     std::string
         problem;  // why the disk took no more, or gave other samples back, and what to do; empty while all was well
 };

@@ -39,7 +39,9 @@ nlohmann::json take_json(const TakeReport& report, const std::vector<PlannedArch
         if (const auto& clock = report.record.cameras[n].clock) json["cameras"][n]["clock"] = clock_record(*clock);
     json["host_clock"] = report.record.host_clock ? clock_record(*report.record.host_clock) : nlohmann::json();
     json["seconds"]["total"] = report.seconds_total;
-    json["memory"] = {{"frames_spilled", report.memory.frames_spilled}, {"problem", report.memory.problem}};
+    json["memory"] = {{"frames_spilled", report.memory.frames_spilled},
+                      {"is_locked", report.memory.is_locked},
+                      {"problem", report.memory.problem}};
     for (size_t n = 1; n < planned.size(); ++n) json["also"].push_back(to_json(report.outputs[n], planned[n].path));
     return json;
 }

@@ -2,6 +2,7 @@
 # The API as others see it: JSON-RPC 2.0 by its specification, over a Unix socket and over HTTP, and what must not get through.
 import json
 import re
+import signal
 import socket
 import subprocess
 import threading
@@ -28,6 +29,8 @@ def test_requests_are_answered_as_the_specification_says(daemon):
         '{"jsonrpc": "2.0", "method": "arm", "params": {"secs": 1}, "id": 2}': (2, -32602),
         '{"jsonrpc": "2.0", "method": "arm", "params": {"seconds": "long"}, "id": 2}': (2, -32602),
         '{"jsonrpc": "2.0", "method": "arm", "params": {"seconds": -1}, "id": 2}': (2, -32602),
+        '{"jsonrpc": "2.0", "method": "record", "params": {"number": 0}, "id": 2}': (2, -32602),
+        '{"jsonrpc": "2.0", "method": "calibrate", "params": {"cycles": 0}, "id": 2}': (2, -32602),
         '{"jsonrpc": "2.0", "method": 1, "id": 3}': (3, -32600),
         '{"jsonrpc": "1.0", "method": "version", "id": 4}': (4, -32600),
         '{"jsonrpc": "2.0", "method": "version", "params": [1], "id": 5}': (5, -32600),
@@ -239,6 +242,25 @@ def test_a_subscriber_that_reads_nothing_is_let_go_of_and_others_notice_nothing(
     mute.close()
 
 
+def test_a_full_house_hears_who_comes_to_put_the_light_out(daemon):
+    daemon.run("record", "--seconds", "60", "--no-wait")
+    silent = [socket.socket(socket.AF_UNIX) for _ in range(40)]
+    for one in silent:
+        one.connect(str(daemon.socket))
+    assert daemon.run("stop", "--json")["dark"]
+    assert "was silent" in daemon.events("client_dropped")[-1]["text"]
+    for one in silent:
+        one.close()
+
+
+def test_a_daemon_that_hangs_is_said_with_what_ends_the_light_without_it(alone):
+    daemon = alone()
+    daemon.process.send_signal(signal.SIGSTOP)
+    assert "use the emergency stop" in daemon.run("stop", code=1)
+    daemon.process.send_signal(signal.SIGCONT)
+    assert daemon.state() == "idle"
+
+
 def test_two_clients_at_once_are_both_answered(daemon):
     with daemon.connect() as a, daemon.connect() as b:
         results = {}
@@ -274,6 +296,8 @@ def test_metrics_are_what_prometheus_reads(daemon):
     assert samples[("stagectl_state", (("state", "idle"),))] == 1
     assert sum(value for (name, _), value in samples.items() if name == "stagectl_state") == 1
     assert samples[("stagectl_targets_written_total", ())] >= 1
+    assert samples[("stagectl_events_total", (("event", "disk_failed"),))] == 0, "from the start: a rate needs it"
+    assert samples[("stagectl_camera_slots_missing_total", (("camera", "0"), ("cause", "camera_gone")))] == 0
     assert samples[("stagectl_camera_frames_received_total", (("camera", "0"),))] >= 160
     for family in families.values():
         assert family.documentation and family.type in ("counter", "gauge")

@@ -2,6 +2,8 @@
 # What goes away or goes wrong, in each state: the daemon says what, ends dark, keeps what was finished, and goes on when it is back.
 import json
 import os
+import pathlib
+import re
 import signal
 import subprocess
 import time
@@ -96,6 +98,21 @@ def test_a_daemon_that_is_killed_loses_no_finished_target_and_the_board_goes_dar
         assert take["state"] == "unfinished" and take["targets_written"] >= written
         report = subprocess.run([str(BIN / "rf"), "verify", take["archive"], "--json"], capture_output=True, text=True)
         assert len(json.loads(report.stdout)["intact"]) == take["targets_written"]
+    assert daemon.run("record", "--slate", "after", "--json")["targets_missing"] == 0
+
+
+def test_a_take_that_there_is_no_memory_for_is_an_error_and_no_light(alone):
+    daemon = alone()
+    daemon.run("arm")
+    of_daemon = ["prlimit", "--pid", str(daemon.process.pid)]
+    size_kb = re.search(r"VmSize:\s+(\d+)", pathlib.Path(f"/proc/{daemon.process.pid}/status").read_text())[1]
+    subprocess.run([*of_daemon, f"--as={(int(size_kb) << 10) + (1 << 20)}:unlimited"], check=True)
+    assert daemon.run("record", "--slate", "none", code=1)
+    subprocess.run([*of_daemon, "--as=unlimited:unlimited"], check=True)
+    daemon.until_state("idle", "fault")
+    assert daemon.run("stop", "--json")["dark"]
+    if daemon.state() == "fault":
+        daemon.run("status", "--clear-fault")
     assert daemon.run("record", "--slate", "after", "--json")["targets_missing"] == 0
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # The daemon as a service: what it tells systemd, its log, and hours of takes without a leak.
 import grp
+import json
 import os
 import random
 import re
@@ -11,7 +12,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from stage_daemon import BIN, assert_frames_have_their_slots, read_lamps, until
+from stage_daemon import BIN, misplaced_lamps, read_lamps, until
 
 
 class Systemd:
@@ -107,8 +108,9 @@ def test_takes_with_random_faults_have_each_frame_in_its_slot_and_leave_the_daem
         archive = Path(latest["archive"])
         if truth is None and latest["targets_written"]:
             truth = read_lamps(min((archive / "cam0").glob("target_??????.exr")))
-        if truth is not None:
-            assert_frames_have_their_slots(archive, truth)
+        # An old buffer behind a frame of another size is a picture that was never handed on: no bits tell it, the lamps' light does.
+        misplaced = truth is not None and misplaced_lamps(archive, truth)
+        assert not misplaced or json.loads(out)["suspect_targets"], (take, misplaced)
         shutil.rmtree(archive)
     assert seen > 0, "faults were noticed"
     warm = figures[min(4, takes // 2) :]

@@ -146,6 +146,15 @@ def test_a_calibration_is_measured_and_in_force(alone):
     assert daemon.run("record", "--json")["targets_written"] >= 1
 
 
+def test_a_calibration_that_is_stopped_is_none(daemon):
+    daemon.call("calibrate", card=0.985, cycles=2000)
+    until(lambda: (daemon.call("status")["take"] or {}).get("triggers_fired", 0) > 400)
+    assert daemon.run("stop", "--json")["dark"]
+    daemon.until_state("idle")
+    assert "was cut short: stopped by" in daemon.events("calibration_failed")[-1]["text"]
+    assert not (daemon.folder / "calibration/cam0").exists()
+
+
 # The reserve is put so near to what is free that a file of another program reaches it.
 def test_a_disk_that_comes_to_its_reserve_ends_the_take_cleanly(alone):
     daemon = alone()

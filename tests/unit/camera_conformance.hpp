@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -196,6 +197,18 @@ TEST_P(CameraConformance, a_device_that_fails_is_gone_and_says_so_and_does_not_s
     const auto again = camera_->start();
     ASSERT_FALSE(again.ok());
     EXPECT_NE(again.error().message.find("gone"), std::string::npos) << again.error().message;
+}
+
+TEST_P(CameraConformance, a_device_that_fails_while_nobody_reads_is_found_gone_by_a_look) {
+    EXPECT_EQ(camera_->look().kind, CameraState::live);
+    rig_->die();
+    CameraState state = camera_->look();
+    for (int waited_ms = 0; waited_ms < surely_ms && state.kind == CameraState::live; waited_ms += 10) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        state = camera_->look();
+    }
+    EXPECT_EQ(state.kind, CameraState::gone);
+    EXPECT_NE(state.why.find("gone"), std::string::npos) << state.why;
 }
 
 TEST_P(CameraConformance, two_cameras_share_nothing) {

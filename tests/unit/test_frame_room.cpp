@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "small_disk.hpp"
@@ -41,6 +42,14 @@ std::shared_ptr<Frame> read_frame(FrameRoom& room, int number) {
 bool shows(const Frame& frame, int number) {
     return frame.samples.size() == bytes && frame.stamp.frame_id == uint64_t(number) &&
            std::all_of(frame.samples.begin(), frame.samples.end(), [&](std::byte b) { return b == std::byte(number); });
+}
+
+// proc(5), VmLck.
+uint64_t locked_kb() {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;)
+        if (word == "VmLck:") return status >> word, std::stoull(word);
+    return 0;
 }
 
 class FrameRooms : public testing::Test {
@@ -161,6 +170,17 @@ TEST_F(FrameRooms, a_full_disk_is_named_and_what_it_does_not_take_stays_in_memor
     });
     if (code == no_mount) GTEST_SKIP() << "mounting a small disk needs rights that are not given here";
     EXPECT_EQ(code, 0);
+}
+
+TEST_F(FrameRooms, memory_is_locked_as_the_kernel_counts_it) {
+    const uint64_t before_kb = locked_kb();
+    auto room = FrameRoom::create(options_of(1000));
+    ASSERT_TRUE(room.ok());
+    const uint64_t held_kb = 1000 * FrameRoom::bytes_a_frame(bytes) / 1024;
+    if (!(*room)->use().is_locked) GTEST_SKIP() << "this machine lets nobody lock " << held_kb << " kB";
+    EXPECT_GE(locked_kb(), before_kb + held_kb);
+    room->reset();
+    EXPECT_EQ(locked_kb(), before_kb);
 }
 
 TEST_F(FrameRooms, memory_that_is_not_there_is_an_error_before_the_take) {

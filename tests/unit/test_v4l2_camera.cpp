@@ -293,4 +293,14 @@ TEST_F(V4l2CameraTest, one_that_is_silent_for_long_is_asked_and_lives_if_it_answ
     model_->hang_no_more();
 }
 
+TEST_F(V4l2CameraTest, one_that_hangs_is_found_by_a_look_also_behind_a_stop) {
+    open(20);
+    ASSERT_EQ(set_up(setup_of(Cfa::rggb, 12)), "");
+    camera_->stop();
+    model_->hang_in(VIDIOC_QUERYCAP);
+    EXPECT_EQ(camera_->look().kind, CameraState::gone);
+    EXPECT_TRUE(has(camera_->state().why, "no answer to VIDIOC_QUERYCAP")) << camera_->state().why;
+    model_->hang_no_more();
+}
+
 }  // namespace ols::test
