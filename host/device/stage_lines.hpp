@@ -52,8 +52,8 @@ class StageLines {
     static std::vector<GpioLineSetup> outputs_of(const GpioSetup& setup);
 
     // Returns when the arm button has been pressed; one that is down already must be let go first. Errors: `stop` has become true,
-    // the emergency stop is or was pressed, the chip has gone.
-    Status wait_for_arm(const std::atomic<bool>& stop, const std::function<Status()>& meanwhile);
+    // the emergency stop is or was pressed, the chip has gone; what `meanwhile` says, which is called some fifty times a second.
+    Status wait_for_arm(const std::atomic<bool>& stop, const std::function<Status()>& meanwhile = nullptr);
 
     // A take begins: the tally is lit, until the take ends or `stop` is true. Errors: the emergency stop is or was pressed, genlock is
     // absent where that stops, the chip has gone.

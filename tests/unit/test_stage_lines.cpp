@@ -254,6 +254,18 @@ TEST_F(StageLinesTest, waiting_for_the_button_ends_at_a_stop_an_emergency_stop_a
     EXPECT_NE(lines().wait_for_arm(stop_).error().message.find("has gone"), std::string::npos);
 }
 
+TEST_F(StageLinesTest, a_press_during_what_is_done_meanwhile_counts_and_an_error_of_that_ends_the_wait) {
+    int calls = 0;
+    const auto press_in_third = [&] {
+        if (++calls == 3) chip_.move(arm, true), chip_.settle();
+        return Status(Done{});
+    };
+    EXPECT_TRUE(lines().wait_for_arm(stop_, press_in_third).ok());
+    EXPECT_EQ(calls, 3);
+    const Status ended = lines().wait_for_arm(stop_, [] { return Status(fail("the board is gone")); });
+    EXPECT_EQ(ended.error().message, "the board is gone");
+}
+
 TEST_F(StageLinesTest, a_chip_that_goes_ends_the_take_by_name_and_says_that_the_tally_cannot_be_switched) {
     ASSERT_TRUE(lines().begin_take(stop_).ok());
     chip_.unbind();
