@@ -192,7 +192,11 @@ Result<TakeReport> Conductor::run_planned(TakePlan& plan, std::vector<PlannedArc
     };
     sinks.monitor = &take->monitor;
     for (PlannedArchive& archive : archives) sinks.outputs.push_back({archive.archive, archive.targets});
-    return run_take(description, {devices_->board(), devices_->cameras(), true}, sinks, stop_);
+    // Clearing gigabytes outlasts the heartbeat of an armed board: behind them it is armed anew.
+    const bool stays_armed = stage_.daemon.memory_mb == 0;
+    if (!stays_armed)
+        if (const Status dark = devices_->make_dark(); !dark) return dark.error();
+    return run_take(description, {devices_->board(), devices_->cameras(), stays_armed}, sinks, stop_);
 }
 
 void Conductor::end_record(const Result<TakeReport>& report, const std::vector<PlannedArchive>& archives,

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Takes by the daemon: what is recorded is what `stagectl run` records, light ends at a word, and no disk ends a take otherwise than clean.
+import contextlib
 import json
 import re
 import signal
@@ -156,24 +157,51 @@ def test_a_calibration_that_is_stopped_is_none(daemon):
 
 
 # The reserve is put so near to what is free that a file of another program reaches it.
-def test_a_disk_that_comes_to_its_reserve_ends_the_take_cleanly(alone):
-    daemon = alone()
+def leave_2_gb(daemon):
     reserve_mb = int((daemon.call("status")["disk_bytes_free"] - 2e9) / 1e6)
     daemon.config.write_text(daemon.text.replace("reserve_mb = 10", f"reserve_mb = {reserve_mb}"))
     daemon.run("reload")
     daemon.until_state("idle")
-    client = daemon.background("record", "--seconds", "60", "--json")
-    until(lambda: ((daemon.call("status")["take"] or {}).get("triggers_fired", 0)) > 400)
+
+
+@contextlib.contextmanager
+def filled(daemon):
     filler = daemon.folder / "filler"
     subprocess.run(["fallocate", "-l", "3G", str(filler)], check=True)
-    out, err = client.communicate(timeout=120)
+    yield
     filler.unlink()
+
+
+def test_a_disk_that_comes_to_its_reserve_ends_the_take_cleanly(alone):
+    daemon = alone()
+    leave_2_gb(daemon)
+    client = daemon.background("record", "--seconds", "60", "--json")
+    until(lambda: ((daemon.call("status")["take"] or {}).get("triggers_fired", 0)) > 400)
+    with filled(daemon):
+        out, err = client.communicate(timeout=120)
     assert client.returncode == 2, err
     end = json.loads(out)
     assert daemon.events("disk_full") and "are kept" in daemon.events("take_finished")[-1]["text"]
     assert end["targets_written"] >= 1 and end["write_error"] == ""
     assert {take["state"] for take in daemon.run("takes", "--json")["takes"]} == {"finished"}
     assert daemon.until_state("idle")
+
+
+def test_a_swap_that_the_disk_has_no_room_for_leaves_the_sequence_and_nothing_armed(alone):
+    daemon = alone()
+    leave_2_gb(daemon)
+    daemon.run("arm")
+    with filled(daemon):
+        assert "make room" in daemon.run("swap", "s159", code=1)
+    assert daemon.call("status")["sequence"] == "single" and daemon.until_state("idle")
+    assert daemon.run("record", "--json")["targets_missing"] == 0
+
+
+def test_a_take_of_much_memory_is_armed_behind_its_clearing(alone):
+    daemon = alone("memory_mb = 2000")
+    daemon.run("arm")
+    take = daemon.run("record", "--json")
+    assert take["targets_missing"] == 0 and take["slots_missing_total"] == 0
 
 
 def test_recording_without_seconds_is_as_configured(daemon):
