@@ -73,7 +73,7 @@ daemon-test: all ## the daemon: its API, takes, failures in each state, on the v
 daemon-test-addresses: all ## the same, the daemon with AddressSanitizer and UndefinedBehaviorSanitizer
 	@test -e $(CHECKED)/build.ninja || cmake -S . -B $(CHECKED) -G Ninja -DOLS_SANITIZE=ON >/dev/null
 	@ninja -C $(CHECKED) --quiet stagectl
-	@SERVE=$(CHECKED)/bin/stagectl $(PYTHON) -m pytest -q tests/daemon
+	@SERVE=$(CHECKED)/bin/stagectl ASAN_OPTIONS=quarantine_size_mb=8:verify_asan_link_order=0 $(PYTHON) -m pytest -q tests/daemon
 
 daemon-test-threads: all ## the same, the daemon with ThreadSanitizer
 	@test -e $(THREADS)/build.ninja || cmake -S . -B $(THREADS) -G Ninja -DOLS_SANITIZE_THREADS=ON -DOLS_TESTS=OFF >/dev/null
