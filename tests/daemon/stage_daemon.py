@@ -213,8 +213,8 @@ def bring_to(daemon, state):
 
 def targets_written(daemon):
     """So far, of the take that runs."""
-    take = daemon.call("status")["take"]
-    return take["outputs"][0]["targets_written"] if take else 0
+    outputs = (daemon.call("status")["take"] or {"outputs": []})["outputs"]
+    return outputs[0]["targets_written"] if outputs else 0  # there are none before it develops
 
 
 def assert_takes_are_whole(daemon, targets_at_least):
